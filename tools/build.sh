@@ -20,6 +20,7 @@ elif [[ ${ROS_DISTRO:-} != jazzy ]]; then
 fi
 export VIRTUAL_ENV=$venv PATH=$venv/bin:$PATH
 # colcon itself calls `setup.py install`, of which setuptools warns at every build.
+unset PYTHONDONTWRITEBYTECODE # compile once, at the build
 export PYTHONWARNINGS="ignore:setup.py install is deprecated,ignore:easy_install command is deprecated"
 
 colcon build --base-paths src --packages-select "$@"

@@ -11,7 +11,10 @@ def shared(folder: str) -> list[tuple[str, list[str]]]:
     """List (destination, files) pairs that put all files below `folder` into the share."""
     folders = [Path(folder), *(path for path in Path(folder).rglob("*") if path.is_dir())]
     return [
-        (f"share/{PACKAGE}/{path}", [str(file) for file in sorted(path.iterdir()) if file.is_file()])
+        (
+            f"share/{PACKAGE}/{path}",
+            [str(file) for file in sorted(path.iterdir()) if file.is_file()],
+        )
         for path in folders
         if path.is_dir()
     ]

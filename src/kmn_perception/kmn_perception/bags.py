@@ -1,5 +1,7 @@
 """Read and write rosbag2 recordings: messages stay the CDR bytes that were recorded."""
 
+from __future__ import annotations
+
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -180,7 +182,7 @@ def _open(bag: Path) -> Iterator[Reader]:
 
 
 def _connections(bag: Path, reader: Reader) -> list[Connection]:
-    """The topics as the storage files state them.
+    """List the topics as the storage files state them.
 
     Those of ``metadata.yaml`` may state another quality of service, for which rosbags then finds
     no message in the files.

@@ -1,5 +1,7 @@
 """Publish a rosbag2 recording at its recorded pace."""
 
+from __future__ import annotations
+
 import argparse
 import importlib
 import math
@@ -144,6 +146,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def positive_number(text: str) -> float:
+    """Parse an argument that must be finite and above zero."""
     number = float(text)
     if not 0.0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not a positive number")
@@ -151,6 +154,7 @@ def positive_number(text: str) -> float:
 
 
 def topic_mapping(text: str) -> tuple[str, str]:
+    """Parse ``FROM:=TO`` into the recorded and the published topic."""
     recorded, separator, published = text.partition(":=")
     if not (recorded and separator and published):
         raise argparse.ArgumentTypeError(f"{text} is not of the form FROM:=TO")

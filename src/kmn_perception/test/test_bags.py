@@ -1,5 +1,7 @@
 """Reading and writing rosbag2 recordings."""
 
+from __future__ import annotations
+
 import shutil
 from array import array
 from collections.abc import Iterator

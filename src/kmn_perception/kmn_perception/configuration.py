@@ -1,0 +1,109 @@
+"""Reading of YAML files, with errors that name the file and the key."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class ConfigurationError(ValueError):
+    """A configuration file is wrong; the text names the file, the key and what was expected."""
+
+
+class Section:
+    """A mapping of a YAML file that knows its place, for errors that name the key.
+
+    Parameters
+    ----------
+    values
+        What the file holds at this place.
+    place
+        File and keys that lead here, e.g. ``door.yaml: bodies.panel``.
+    """
+
+    def __init__(self, values: object, place: str) -> None:
+        if not isinstance(values, Mapping):
+            raise ConfigurationError(f"{place}: expected keys and values, found {values!r}")
+        self.values: Mapping[Any, Any] = values
+        self.place = place
+
+    @classmethod
+    def load(cls, path: Path) -> Section:
+        """Read a YAML file."""
+        try:
+            return cls(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
+        except yaml.YAMLError as error:
+            raise ConfigurationError(f"{path.name}: not YAML: {error}") from error
+
+    def allow(self, required: Collection[str], optional: Collection[str] = ()) -> None:
+        """Raise if a required key is missing or a key is unknown."""
+        for key in required:
+            if key not in self.values:
+                raise self.error(f"key '{key}' is missing")
+        for key in self.values:
+            if key not in required and key not in optional:
+                known = ", ".join((*required, *optional))
+                raise self.error(f"unknown key '{key}' (known: {known})")
+
+    def error(self, text: str) -> ConfigurationError:
+        """Return an error that names this place."""
+        return ConfigurationError(f"{self.place}: {text}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def section(self, key: str) -> Section:
+        """Return the mapping below a key; an absent one is empty."""
+        return Section(self.values.get(key, {}), f"{self.place}: {key}")
+
+    def sections(self, key: str) -> list[Section]:
+        """Return the mappings of a list below a key; an absent one is empty."""
+        entries = self.values.get(key, [])
+        if not isinstance(entries, list):
+            raise self.error(f"'{key}' must be a list, found {entries!r}")
+        return [Section(entry, f"{self.place}: {key}[{i}]") for i, entry in enumerate(entries)]
+
+    def text(self, key: str, choices: Collection[str] = (), default: str | None = None) -> str:
+        """Return a text, if ``choices`` are given one of these."""
+        value = self.values.get(key, default)
+        if not isinstance(value, str) or (choices and value not in choices):
+            expected = f"one of {', '.join(choices)}" if choices else "a text"
+            raise self.error(f"'{key}' must be {expected}, found {value!r}")
+        return value
+
+    def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
+        """Return a finite number within [low, high]."""
+        value = self.values.get(key)
+        if not is_number(value) or not low <= float(value) <= high:
+            raise self.error(f"'{key}' must be a number in [{low:g}, {high:g}], found {value!r}")
+        return float(value)
+
+    def whole_number(self, key: str, low: int, high: int) -> int:
+        """Return a whole number within [low, high]."""
+        value = self.values.get(key)
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+            raise self.error(f"'{key}' must be a whole number in [{low}, {high}], found {value!r}")
+        return value
+
+    def numbers(self, key: str, length: int) -> list[float]:
+        """Return a list of finite numbers of a given length."""
+        value = self.values.get(key)
+        if not isinstance(value, list) or len(value) != length or not all(map(is_number, value)):
+            raise self.error(f"'{key}' must be {length} numbers, found {value!r}")
+        return [float(number) for number in value]
+
+    def limits(self, key: str) -> tuple[float, float]:
+        """Return an interval; its lower end must lie below its upper end."""
+        low, high = self.numbers(key, 2)
+        if low >= high:
+            raise self.error(f"'{key}' are reversed: lower {low:g} is not below upper {high:g}")
+        return low, high
+
+
+def is_number(value: object) -> bool:
+    """Tell whether a YAML value is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,205 @@
+"""From an object's point cloud to morphing parameters that can be trusted, or a reason why not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception import weights
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.morph import predict, start
+from kmn_perception.network import MorphNetwork
+from kmn_perception.residual import surface_distances
+
+
+class Status(IntEnum):
+    """What an estimate is worth; equal to the constants of kmn_msgs/MorphingParameters."""
+
+    OK = 0
+    NO_OBJECT = 1
+    TOO_FEW_POINTS = 2
+    NOT_CONVERGED = 3
+    OUT_OF_LIMITS = 4
+
+
+@dataclass(frozen=True)
+class EstimatorSettings:
+    """Settings of the iterative prediction and of its checks.
+
+    Attributes
+    ----------
+    iterations
+        Largest number N of predictions.
+    tolerance
+        Converged when a step changes no transformation parameter by more than this (m, rad, 1).
+    min_points
+        Fewer points than this are not estimated.
+    max_residual
+        Largest median distance of the points to the predicted surface, metres.
+    limit_margin
+        By how much of its range a parameter may lie beyond its limits.
+    """
+
+    iterations: int
+    tolerance: float
+    min_points: int
+    max_residual: float
+    limit_margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Morphing parameters of one observation; NaN where there is no estimate.
+
+    Attributes
+    ----------
+    theta, gamma
+        (n,) and (m,) morphing parameters, metres, radians and scales.
+    covariance
+        (n + m, n + m) over (theta, gamma).
+    transform
+        (4, 4) T_theta, from the prototype to the world.
+    iterations, converged
+        Number of predictions, and whether the last one was near the identity.
+    residual
+        Median distance of the points to the predicted surface, metres.
+    points_used
+        Number of points.
+    status, reason
+        What it is worth; the reason is empty when the status is OK.
+    """
+
+    theta: NDArray[np.float64]
+    gamma: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    transform: NDArray[np.float64]
+    iterations: int
+    converged: bool
+    residual: float
+    points_used: int
+    status: Status
+    reason: str
+
+    @classmethod
+    def none(cls, model: KinematicModel, points: int, status: Status, reason: str) -> Estimate:
+        """Return the estimate that says why there is none."""
+        n, m = len(model.theta), len(model.gamma)
+        return cls(
+            theta=np.full(n, np.nan),
+            gamma=np.full(m, np.nan),
+            covariance=np.full((n + m, n + m), np.nan),
+            transform=np.full((4, 4), np.nan),
+            iterations=0,
+            converged=False,
+            residual=np.nan,
+            points_used=points,
+            status=status,
+            reason=reason,
+        )
+
+
+class MorphEstimator:
+    """Runs the kinematic morphing network of one model.
+
+    Attributes
+    ----------
+    model, network, settings
+        May be replaced between two estimates.
+    """
+
+    def __init__(
+        self, model: KinematicModel, network: MorphNetwork, settings: EstimatorSettings
+    ) -> None:
+        self.model, self.network, self.settings = model, network, settings
+
+    @classmethod
+    def load(
+        cls, model: str | Path, weights_file: str | Path, settings: EstimatorSettings
+    ) -> MorphEstimator:
+        """Load a model and its weights; an empty ``weights_file`` means the shipped ones.
+
+        Raises
+        ------
+        FileNotFoundError, ConfigurationError
+            If the model's file is missing or wrong.
+        WeightsError
+            If the weights are missing, corrupt, or of another model.
+        """
+        kinematic_model = KinematicModel.load(model)
+        file = weights_file or kinematic_model.name
+        return cls(kinematic_model, weights.load(file, kinematic_model).kmn, settings)
+
+    def warm_up(self) -> None:
+        """Compile and load all that the first estimate needs, so that it is not slow."""
+        cubes = self.model.unit_cubes(
+            np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma))
+        )
+        self.estimate(
+            np.repeat(cubes[:, :3, 3], self.settings.min_points, axis=0).astype(np.float32)
+        )
+
+    def estimate(self, points: NDArray[np.float32]) -> Estimate:
+        """Estimate the morphing parameters of an object.
+
+        Parameters
+        ----------
+        points
+            (N, 3) points of the object alone, world frame, metres, finite.
+        """
+        model, settings = self.model, self.settings
+        if len(points) == 0:
+            return Estimate.none(model, 0, Status.NO_OBJECT, "no points of an object")
+        if len(points) < settings.min_points:
+            reason = f"{len(points)} points, at least {settings.min_points} are needed"
+            return Estimate.none(model, len(points), Status.TOO_FEW_POINTS, reason)
+        prediction, iterations = predict(
+            model,
+            self.network,
+            [points],
+            start(model, [points]),
+            settings.iterations,
+            settings.tolerance,
+        )
+        theta, gamma = model.split(prediction.values[0])
+        residual = float(np.median(surface_distances(model.unit_cubes(theta, gamma), points)))
+        change = float(prediction.change[0])
+        status, reason = self._judge(prediction.values[0], change, residual)
+        return Estimate(
+            theta=theta,
+            gamma=gamma,
+            covariance=np.full((len(model.parameters),) * 2, np.nan),
+            transform=model.transformation.matrix(theta),
+            iterations=iterations,
+            converged=change <= settings.tolerance,
+            residual=residual,
+            points_used=len(points),
+            status=status,
+            reason=reason,
+        )
+
+    def _judge(
+        self, values: NDArray[np.float64], change: float, residual: float
+    ) -> tuple[Status, str]:
+        """Return the status of an estimate, and the reason if it is not OK."""
+        settings = self.settings
+        margin = settings.limit_margin * np.ptp(self.model.limits, axis=1)
+        for parameter, value, slack in zip(self.model.parameters, values, margin, strict=True):
+            low, high = parameter.limits
+            if not low - slack <= value <= high + slack:
+                reason = f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]"
+                return Status.OUT_OF_LIMITS, reason
+        if not residual <= settings.max_residual:
+            return Status.NOT_CONVERGED, (
+                f"the points lie {residual:.3f} m from the model, "
+                f"more than {settings.max_residual:g} m"
+            )
+        if not change <= settings.tolerance:
+            return Status.NOT_CONVERGED, (
+                f"the last prediction still changed theta by {change:.3f}, "
+                f"more than {settings.tolerance:g}"
+            )
+        return Status.OK, ""

@@ -1,0 +1,36 @@
+"""Errors of predicted morphing parameters, as the paper measures them."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.morph import Clouds, predictions, start
+from kmn_perception.network import MorphNetwork
+
+
+def absolute_errors(
+    model: KinematicModel, values: NDArray[np.float64], truth: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return |values - truth| (..., n + m), of the equivalent parameters nearest to the truth."""
+    return np.abs(model.nearest_equivalent(values, truth) - truth)
+
+
+def errors_by_step(
+    model: KinematicModel,
+    network: MorphNetwork,
+    clouds: Clouds,
+    truth: NDArray[np.float64],
+    steps: int,
+) -> NDArray[np.float64]:
+    """Return the absolute errors (steps + 1, B, n + m) after 0, 1, ..., ``steps`` predictions.
+
+    Before the first prediction the estimate is the start of Algorithm 1 with gamma_0 = 0.
+    """
+    theta = start(model, clouds)
+    values = [np.concatenate((theta, np.zeros((len(theta), len(model.gamma)))), axis=1)]
+    values += [state.values for state in islice(predictions(model, network, clouds, theta), steps)]
+    return absolute_errors(model, np.stack(values), truth)

@@ -1,0 +1,1 @@
+"""The offline training tool: Algorithm 2 of the paper."""

@@ -1,0 +1,99 @@
+"""Random observations of a model: the data of Algorithm 2 and of the evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.camera import Camera, look_at
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.rendering import depth_to_cloud, render
+from kmn_perception.sensor import add_noise
+from kmn_perception.training.settings import SensorSettings
+
+LEAST_POINTS = 100  # a sample of which less is seen is drawn again
+
+
+def sample(
+    model: KinematicModel,
+    seed: int,
+    index: int,
+    sensor: SensorSettings | None = None,
+    noise: str = "none",
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Return sample ``index`` of the endless sequence that a seed stands for.
+
+    Parameters
+    ----------
+    sensor
+        A sensor around the object; ``None`` for the canonical camera with ``noise``.
+
+    Returns
+    -------
+    cloud, values
+        (N, 3) observed points in the world frame, metres, and (n + m,) true (theta, gamma).
+    """
+    generator = np.random.default_rng((seed, index))
+    while True:
+        values = model.sample(generator, 1)[0]
+        if sensor is None:
+            cloud = observe(model, values, model.camera, noise, generator)
+        else:
+            cloud = _observe_from_around(model, values, sensor, generator)
+        if len(cloud) >= LEAST_POINTS:
+            return cloud, values
+
+
+def observe(
+    model: KinematicModel,
+    values: NDArray[np.float64],
+    camera: Camera,
+    noise: str,
+    generator: np.random.Generator,
+) -> NDArray[np.float32]:
+    """Return the points (N, 3) of m(theta, gamma) that a camera sees, in the world frame."""
+    depth = render(model.unit_cubes(*model.split(values)), camera)
+    return depth_to_cloud(add_noise(depth, noise, generator), camera)
+
+
+def _observe_from_around(
+    model: KinematicModel,
+    values: NDArray[np.float64],
+    sensor: SensorSettings,
+    generator: np.random.Generator,
+) -> NDArray[np.float32]:
+    cubes = model.unit_cubes(*model.split(values))
+    camera = _place(_camera(sensor.camera), cubes[:, :3, 3].mean(axis=0), model, sensor, generator)
+    cloud = observe(model, values, camera, sensor.noise, generator)
+    cloud = cloud[cloud[:, 2] > generator.uniform(0.0, sensor.cut_height)]
+    if len(cloud) and generator.uniform() < sensor.occlusion:
+        direction = generator.standard_normal(3)
+        along = cloud @ direction.astype(np.float32)
+        cloud = cloud[along >= np.quantile(along, generator.uniform(0.0, 0.4))]
+    return cloud
+
+
+@cache
+def _camera(name: str) -> Camera:
+    return Camera.load(name)
+
+
+def _place(
+    camera: Camera,
+    target: NDArray[np.float64],
+    model: KinematicModel,
+    sensor: SensorSettings,
+    generator: np.random.Generator,
+) -> Camera:
+    """Put the camera at a random place around the target, looking roughly at it."""
+    distance = generator.uniform(*sensor.distance)
+    elevation = generator.uniform(*sensor.elevation)
+    heading = np.arctan2(model.camera.pose[1, 2], model.camera.pose[0, 2])
+    azimuth = heading + generator.uniform(*sensor.azimuth)
+    back = -np.array([np.cos(azimuth), np.sin(azimuth), 0.0]) * np.cos(elevation)
+    back[2] = np.sin(elevation)
+    aim = target + generator.uniform(-0.2, 0.2, size=3) * distance
+    return replace(camera, pose=look_at(target + back * distance, aim))

@@ -1,0 +1,98 @@
+"""The ``train`` executable: train the network of a model and write its weight file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import shutil
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from kmn_perception import weights
+from kmn_perception.configuration import ConfigurationError
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.training.algorithm2 import Algorithm2
+from kmn_perception.training.run import Run, RunError
+from kmn_perception.training.settings import TrainingSettings
+from kmn_perception.training.workers import Workers
+
+
+def arguments(argv: list[str] | None = None) -> argparse.Namespace:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(prog="train", description=__doc__)
+    parser.add_argument("--model", required=True, help="name or YAML file of the kinematic model")
+    parser.add_argument("--out", required=True, type=Path, help="weight file to write")
+    parser.add_argument("--config", help="name or YAML file of the settings (default: the model's)")
+    parser.add_argument("--samples", type=int, help="N_data in place of the settings'")
+    parser.add_argument("--epochs", type=int, help="epochs of the first training")
+    parser.add_argument("--retrain-epochs", type=int, help="epochs of each retraining")
+    parser.add_argument("--rounds", type=int, help="largest number of retrainings")
+    parser.add_argument("--seed", type=int, help="seed of data, initialisation and order")
+    parser.add_argument("--run", type=Path, help="folder of the run (default: beside --out)")
+    parser.add_argument("--restart", action="store_true", help="discard an earlier run")
+    parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
+    parser.add_argument("--threads", type=int, default=1, help="threads of torch")
+    return parser.parse_args(argv)
+
+
+def settings_of(options: argparse.Namespace) -> TrainingSettings:
+    """Return the settings of the file with those of the command line in their place."""
+    settings = TrainingSettings.load(options.config or options.model)
+    names = ("samples", "epochs", "retrain_epochs", "rounds", "seed")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    return dataclasses.replace(settings, **given)
+
+
+def train(options: argparse.Namespace) -> None:
+    """Train as the options say, and write the weight file."""
+    model, settings = KinematicModel.load(options.model), settings_of(options)
+    folder = options.run or options.out.with_suffix(".run")
+    torch.set_num_threads(options.threads)
+    with Workers(options.device) as workers:
+        if options.restart and workers.rank == 0 and folder.exists():
+            shutil.rmtree(folder)
+        known = {
+            **weights.describe(model),
+            "channels": list(settings.channels),
+            "training": dataclasses.asdict(settings),
+        }
+        run = Run(folder, {**known, "processes": workers.count})
+        algorithm = Algorithm2(model, settings, run, workers)
+        workers.say(
+            f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
+        )
+        algorithm.train()
+        if workers.rank == 0:
+            weights.save(options.out, _result(algorithm, known))
+            workers.say(f"wrote {options.out}")
+
+
+def _result(algorithm: Algorithm2, known: dict[str, Any]) -> weights.Weights:
+    state = algorithm.state
+    metadata = {
+        **known,
+        "errors": {"by_round_and_step": state.errors, "samples": "validation, never trained on"},
+        "losses": state.losses,
+        "seconds": round(state.seconds),
+    }
+    return weights.Weights(algorithm.network.cpu(), algorithm.baseline.cpu(), metadata)
+
+
+def main() -> None:
+    """Run the executable; an interrupted run is resumed by the same command."""
+    options = arguments()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        train(options)
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the same command resumes from the last checkpoint")
+    except (ConfigurationError, FileNotFoundError, RunError) as error:
+        sys.exit(f"train: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,47 @@
+"""The processes that train together: one, or as many as ``torchrun`` starts."""
+
+from __future__ import annotations
+
+import os
+from types import TracebackType
+
+import torch
+from torch import distributed, nn
+from torch.nn.parallel import DistributedDataParallel
+from tqdm import tqdm
+
+
+class Workers:
+    """A context in which this process knows its rank, the count of processes and its device."""
+
+    def __init__(self, device: str) -> None:
+        self.count = int(os.environ.get("WORLD_SIZE", "1"))
+        self.rank = int(os.environ.get("RANK", "0"))
+        if device == "auto":
+            device = "cuda" if torch.cuda.is_available() else "cpu"
+        if device == "cuda":
+            device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+        self.device = torch.device(device)
+
+    def __enter__(self) -> Workers:
+        if self.count > 1:
+            distributed.init_process_group("nccl" if self.device.type == "cuda" else "gloo")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.count > 1:
+            distributed.destroy_process_group()
+
+    def parallel(self, network: nn.Module) -> nn.Module:
+        """Return the network such that gradients are averaged over all processes."""
+        return DistributedDataParallel(network) if self.count > 1 else network
+
+    def say(self, text: str) -> None:
+        """Print a line above the progress bar, once."""
+        if self.rank == 0:
+            tqdm.write(text)

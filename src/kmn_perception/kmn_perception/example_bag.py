@@ -36,10 +36,16 @@ def load_frames() -> list[NDArray[np.float32]]:
     """Return the shipped depth images (height, width), metres, NaN where nothing was measured."""
     files = (share_directory() / "data" / "kinect_boxes").glob("learn*_d.png")
     in_order = sorted(files, key=lambda file: int(file.stem[len("learn") : -len("_d")]))
-    millimetres = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in in_order]
-    return [
-        np.where(image > 0, image / np.float32(1e3), np.float32("nan")) for image in millimetres
-    ]
+    return [_read_depth(file) for file in in_order]
+
+
+def _read_depth(file: Path) -> NDArray[np.float32]:
+    millimetres = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    if millimetres is None:
+        raise OSError(f"{file} is not a picture")
+    metres = millimetres.astype(np.float32) / np.float32(1e3)
+    metres[millimetres == 0] = np.nan
+    return metres
 
 
 def make_example_bag(bag: Path, rate: float, storage: str = "mcap") -> None:

@@ -52,14 +52,13 @@ clean:  ## remove everything that was made
 	rm -rf .venv build install log outputs runs .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
 
-# Switching between the wheels and a full ROS starts anew.
+# Where the environment is for the other ROS, or missing, it is made anew.
 .PHONY: mode
 ifneq ($(ROS),$(shell cat .venv/ros 2>/dev/null))
 $(READY)nodes: mode
 endif
 
 $(READY)nodes: requirements.txt requirements-ros.txt constraints.txt tools/setup.sh
-	@rm -rf build install log
 	@tools/setup.sh nodes $(ROS)
 	@touch $@
 

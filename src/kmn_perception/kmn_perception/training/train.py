@@ -52,6 +52,7 @@ def train(options: argparse.Namespace) -> None:
     model, settings = KinematicModel.load(options.model), settings_of(options)
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
+    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down several times
     with Workers(options.device) as workers:
         if options.restart and workers.rank == 0 and folder.exists():
             shutil.rmtree(folder)

@@ -1,0 +1,117 @@
+"""The model files: the geometry of the author's scenes, and errors that name the key."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from kmn_perception import resources
+from kmn_perception.configuration import ConfigurationError
+from kmn_perception.kinematic_model import KinematicModel
+
+MODELS = ("box_a", "box_b", "box_c", "box", "door")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_shipped_models_load_with_the_prototype_within_the_limits(name: str) -> None:
+    model = KinematicModel.load(name)
+    assert model.name == name
+    assert (model.limits[:, 0] < 0.0).all()
+    assert (model.limits[:, 1] > 0.0).all()
+
+
+def test_box_c_is_scaled_in_length_and_height() -> None:
+    model = KinematicModel.load("box_c")
+    (cube,) = model.unit_cubes([0.1, -0.2, 0.0, 0.25, 1.0], [])
+    corners = cube @ np.array([[-0.5, -0.5, -0.5, 1.0], [0.5, 0.5, 0.5, 1.0]]).T
+    np.testing.assert_allclose(corners[:3, 0], [0.0, -0.45, 0.0], atol=1e-12)
+    np.testing.assert_allclose(corners[:3, 1], [0.2, 0.05, 0.2], atol=1e-12)
+
+
+def test_door_grows_with_gamma() -> None:
+    """Centre and size of panel and handle as in the author's scene."""
+    model = KinematicModel.load("door")
+    height, width, handle_y, handle_z = gamma = np.array([0.1, -0.1, 0.03, -0.05])
+    panel, handle = model.unit_cubes(np.zeros(3), gamma)
+    np.testing.assert_allclose(np.diag(panel)[:3], [0.038, 0.8 + width, 2.0 + height])
+    np.testing.assert_allclose(panel[:3, 3], [0.0, 0.0, (2.0 + height) / 2.0])
+    np.testing.assert_allclose(np.diag(handle)[:3], [0.04, 0.12, 0.05])
+    centre = [-0.07, -((0.8 + width) / 2.0 - 0.095) + handle_y, (2.0 + height) / 2.0 + handle_z]
+    np.testing.assert_allclose(handle[:3, 3], centre)
+
+
+def test_prototype_is_the_morphed_model() -> None:
+    """Equation 1: m(theta_0, gamma) = T_theta^-1 m(theta, gamma)."""
+    model = KinematicModel.load("door")
+    theta, gamma = [0.3, -0.2, 0.7], [0.1, 0.1, 0.02, 0.05]
+    morphed = model.transformation.inverse(theta) @ model.unit_cubes(theta, gamma)
+    np.testing.assert_allclose(morphed, model.unit_cubes(np.zeros(3), gamma), atol=1e-12)
+
+
+def test_quarter_turn_with_swapped_scales_is_the_same_box() -> None:
+    model = KinematicModel.load("box")
+    values = np.array([0.1, 0.2, 0.7, 0.5, -0.3, 0.1])
+    reference = np.array([0.1, 0.2, -0.8, 0.0, 0.0, 0.0])
+    same = model.nearest_equivalent(values, reference)
+    np.testing.assert_allclose(same, [0.1, 0.2, 0.7 - np.pi / 2.0, -0.3, 0.5, 0.1])
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3, [1.0])).reshape(4, 8)
+    before, after = (
+        {tuple(np.round(corner, 9)) for corner in (model.unit_cubes(v, [])[0] @ corners)[:3].T}
+        for v in (values, same)
+    )
+    assert before == after
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "message"),
+    [
+        (("bodys",), {}, "unknown key 'bodys'"),
+        (("theta",), None, "key 'theta' is missing"),
+        (("theta", 0, "limits"), [0.4, -0.4], r"theta\[0\]: 'limits' are reversed"),
+        (("theta", 2, "kind"), "shear", r"theta\[2\]: 'kind' must be one of translation"),
+        (("theta", 0, "limits"), [0.4, "x"], "must be 2 numbers"),
+        (("gamma", 1, "limits"), [-0.9, 0.2], "panel: 'size' must be positive within the limits"),
+        (("gamma", 0, "name"), "x", "names must differ"),
+        (("bodies", "panel", "size"), [1, {"depth": 1}, 1], "unknown key 'depth' in 'size'"),
+        (("joints", "hinge", "body"), "wing", "'body' must be one of panel, handle"),
+        (("input", "depth_scale"), -1.0, "input: 'depth_scale' must be a number in"),
+        (("symmetry",), "quarter_turn", "needs a rotation about z and scales"),
+    ],
+)
+def test_wrong_files_are_refused_with_the_key(
+    tmp_path: Path, keys: tuple, value: object, message: str
+) -> None:
+    content = yaml.safe_load(resources.find("config/models", "door").read_text())
+    place = content
+    for key in keys[:-1]:
+        place = place[key]
+    if value is None:
+        del place[keys[-1]]
+    else:
+        place[keys[-1]] = value
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ConfigurationError, match=f"mine.yaml: .*{message}"):
+        KinematicModel.load(file)
+
+
+def test_a_scale_that_turns_inside_out_is_refused(tmp_path: Path) -> None:
+    content = yaml.safe_load(resources.find("config/models", "box_c").read_text())
+    content["theta"][4]["limits"] = [-1.5, 1.5]
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ConfigurationError, match="stretches by 1 \\+ s"):
+        KinematicModel.load(file)
+
+
+def test_an_unknown_name_lists_the_shipped_ones() -> None:
+    with pytest.raises(FileNotFoundError, match="'window' is neither a file.*box_a.*door"):
+        KinematicModel.load("window")
+
+
+def test_text_that_is_not_yaml_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("theta: [")
+    with pytest.raises(ConfigurationError, match="mine.yaml: not YAML"):
+        KinematicModel.load(file)

@@ -1,0 +1,133 @@
+"""The training tool with a tiny budget: it learns, resumes to the same weights, and is refused."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.torch import load_file
+
+from kmn_perception import weights
+from kmn_perception.configuration import ConfigurationError
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.morph import predict, start
+from kmn_perception.training.samples import sample
+from kmn_perception.training.settings import TrainingSettings
+from kmn_perception.training.train import arguments, settings_of
+
+COMMAND = [sys.executable, "-m", "kmn_perception.training.train", "--model", "box_a"]
+SMALL = ["--samples", "300", "--epochs", "4", "--retrain-epochs", "1", "--rounds", "1"]
+
+
+def run(out: Path, *more: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [*COMMAND, "--out", str(out), *SMALL, *more], capture_output=True, text=True, check=False
+    )
+
+
+def test_training_learns_and_documents_itself(tmp_path: Path) -> None:
+    out = tmp_path / "w.safetensors"
+    result = run(out)
+    assert result.returncode == 0, result.stderr
+    loaded = weights.load(out, KinematicModel.load("box_a"))
+    by_step = loaded.metadata["errors"]["by_round_and_step"]
+    assert by_step[-1][5] < 0.5 * by_step[-1][0]
+    assert loaded.metadata["training"]["samples"] == 300
+    assert loaded.metadata["camera"]["width"] == 640
+    assert list((tmp_path / "w.run" / "curves").iterdir())
+
+
+def test_an_interrupted_run_resumes_to_the_same_weights(tmp_path: Path) -> None:
+    whole, resumed = tmp_path / "whole.safetensors", tmp_path / "resumed.safetensors"
+    assert run(whole).returncode == 0
+    with subprocess.Popen(
+        [*COMMAND, "--out", str(resumed), *SMALL], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        while "fit" not in process.stderr.readline():
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, rest = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert "resumes from the last checkpoint" in rest
+    assert "Traceback" not in rest
+    assert run(resumed).returncode == 0
+    for name, tensor in load_file(str(whole)).items():
+        np.testing.assert_array_equal(tensor.numpy(), load_file(str(resumed))[name].numpy())
+
+
+def test_a_run_with_other_settings_is_not_continued(tmp_path: Path) -> None:
+    out = tmp_path / "w.safetensors"
+    assert run(out).returncode == 0
+    other = run(out, "--seed", "99")
+    assert other.returncode != 0
+    assert "holds a run with other settings" in other.stderr
+    assert "Traceback" not in other.stderr
+
+
+def test_two_processes_train_together(tmp_path: Path) -> None:
+    out = tmp_path / "w.safetensors"
+    torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
+    result = subprocess.run(
+        [*torchrun, "--nproc-per-node", "2", *COMMAND[1:], "--out", str(out), *SMALL],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    by_step = weights.load(out, KinematicModel.load("box_a")).metadata["errors"]
+    assert by_step["by_round_and_step"][-1][5] < 0.5 * by_step["by_round_and_step"][-1][0]
+
+
+def test_augmented_samples_hold_what_is_left_to_predict() -> None:
+    """Algorithm 2: a morphed sample, morphed by its label, is at the prototype."""
+    model = KinematicModel.load("box_b")
+    network = weights.load("box_b", model).kmn
+    cloud, truth = sample(model, 123, 0)
+    prediction, _ = predict(model, network, [cloud], start(model, [cloud]), steps=1)
+    left = model.transformation.remainder(prediction.values[0], truth)
+    together = model.transformation.matrix(prediction.values[0]) @ model.transformation.matrix(left)
+    np.testing.assert_allclose(together, model.transformation.matrix(truth), atol=1e-9)
+
+
+def test_samples_are_the_same_for_the_same_seed_only() -> None:
+    model = KinematicModel.load("door")
+    cloud, values = sample(model, 5, 17)
+    again, same = sample(model, 5, 17)
+    np.testing.assert_array_equal(cloud, again)
+    np.testing.assert_array_equal(values, same)
+    assert not np.array_equal(values, sample(model, 6, 17)[1])
+    assert not np.array_equal(values, sample(model, 5, 18)[1])
+
+
+def test_the_command_line_replaces_the_settings() -> None:
+    options = arguments(["--model", "door", "--out", "x", "--samples", "50", "--seed", "3"])
+    settings = settings_of(options)
+    assert (settings.samples, settings.seed) == (50, 3)
+    assert settings.channels == (2, 4, 8, 16, 32)  # the paper's
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("channels: [2, 4]", "'channels' must be 5 numbers"),
+        ("samples: many", "'samples' must be a whole number"),
+        ("speed: 3", "unknown key 'speed'"),
+    ],
+)
+def test_wrong_settings_are_refused(tmp_path: Path, line: str, message: str) -> None:
+    from kmn_perception import resources
+
+    key = line.split(":")[0]
+    kept = [
+        text
+        for text in resources.find("config/training", "door").read_text().splitlines()
+        if not text.startswith(f"{key}:")
+    ]
+    file = tmp_path / "mine.yaml"
+    file.write_text("\n".join([*kept, line]))
+    with pytest.raises(ConfigurationError, match=message):
+        TrainingSettings.load(file)

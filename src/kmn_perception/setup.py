@@ -40,7 +40,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "morph_node = kmn_perception.morph_node:main",
+            "morph_node = kmn_perception.start_morph_node:main",
             "replay = kmn_perception.replay:main",
             "make_example_bag = kmn_perception.example_bag:main",
             "demo_bag = kmn_perception.demo:main",

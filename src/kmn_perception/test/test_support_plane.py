@@ -67,7 +67,7 @@ def test_height_and_tilt_are_those_of_the_camera(
     points += np.random.default_rng(1).normal(0.0, noise, points.shape).astype(np.float32)
     plane = find_support_plane(points, SETTINGS)
     assert plane is not None
-    np.testing.assert_allclose(pose_above(plane, canonical), pose, atol=1e-4 + noise)
+    np.testing.assert_allclose(pose_above(plane, canonical), pose, atol=5e-4 + noise)
 
 
 def test_table_before_floor_and_wall_is_the_support() -> None:

@@ -1,0 +1,93 @@
+"""What a node did with its frames, as counts for ``/diagnostics``."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+
+class FrameStatistics:
+    """Counts of frames since the start, rate and latency since the last report; thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._received = self._dropped = self._clock_jumps = 0
+        self._refused: Counter[str] = Counter()
+        self._statuses: Counter[str] = Counter()
+        self._latencies: list[float] = []
+        self._last = "no frames received yet"
+
+    def receive(self, replaced: bool) -> None:
+        """Count a frame that came in, and perhaps the older one that it replaced unused."""
+        with self._lock:
+            self._received += 1
+            self._dropped += replaced
+
+    def count_clock_jump(self) -> None:
+        """Count a stamp that lies before the one received last."""
+        with self._lock:
+            self._clock_jumps += 1
+
+    def refuse(self, reason: str, text: str) -> None:
+        """Count a malformed message by its reason key."""
+        with self._lock:
+            self._refused[reason] += 1
+            self._last = f"refused, {reason}: {text}"
+
+    def use(self, status: str, text: str, latency: float) -> None:
+        """Count a frame that was estimated.
+
+        Parameters
+        ----------
+        status
+            Name of the estimate's status.
+        text
+            Why it is not OK.
+        latency
+            Seconds from reception to publication.
+        """
+        with self._lock:
+            self._statuses[status] += 1
+            self._latencies.append(latency)
+            self._last = f"{status}: {text}" if text else status
+
+    def report(self, name: str, period: float) -> DiagnosticStatus:
+        """Return the counts and begin a new period.
+
+        Parameters
+        ----------
+        name
+            Who reports.
+        period
+            Seconds since the last report.
+        """
+        with self._lock:
+            latencies, self._latencies = self._latencies, []
+            used = self._statuses.total()
+            values = {
+                "rate_hz": f"{len(latencies) / period:.2f}",
+                "latency_mean_ms": f"{1e3 * sum(latencies) / max(len(latencies), 1):.2f}",
+                "latency_max_ms": f"{1e3 * max(latencies, default=0.0):.2f}",
+                "frames_received": str(self._received),
+                "frames_used": str(used),
+                "frames_dropped": str(self._dropped),
+                "frames_refused": str(self._refused.total()),
+                **{f"refused_{key}": str(count) for key, count in sorted(self._refused.items())},
+                **{f"status_{key}": str(count) for key, count in sorted(self._statuses.items())},
+                "clock_jumps": str(self._clock_jumps),
+                "last": self._last,
+            }
+            level = DiagnosticStatus.OK
+            message = self._last
+            if self._last != "OK":
+                level = DiagnosticStatus.WARN
+            elif not latencies:
+                level, message = DiagnosticStatus.WARN, "no frames"
+        return DiagnosticStatus(
+            level=level,
+            name=name,
+            message=message,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )

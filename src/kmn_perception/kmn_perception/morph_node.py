@@ -1,0 +1,242 @@
+"""The node that estimates morphing parameters from clouds or depth images."""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Header
+from visualization_msgs.msg import MarkerArray
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_msgs.srv import EstimateMorphing
+from kmn_perception.diagnostics import FrameStatistics
+from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.mailbox import Mailbox
+from kmn_perception.messages import (
+    MessageError,
+    markers_from_estimate,
+    parameters_from_estimate,
+    points_from_cloud,
+    points_from_depth,
+)
+from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.pipeline import MorphPipeline
+
+DIAGNOSTICS_PERIOD = 1.0  # seconds
+WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
+QUEUE_DEPTH = 10  # of the publishers
+
+
+class Frame(NamedTuple):
+    """A message that waits for its estimation.
+
+    ``read`` returns its points, given the maximal range, or raises `MessageError`; ``received``
+    is in seconds of the monotonic clock.
+    """
+
+    header: Header
+    read: Callable[[float], NDArray[np.float32]]
+    received: float
+
+
+class Answer(NamedTuple):
+    """An estimate with what its messages need."""
+
+    model: KinematicModel
+    estimate: Estimate
+    header: Header
+
+
+class Active(NamedTuple):
+    """What the node works with at present; replaced as a whole when parameters change."""
+
+    settings: NodeSettings
+    pipeline: MorphPipeline
+
+
+class MorphNode(Node):
+    """Estimates the newest frame in a thread of its own; the executor only takes messages.
+
+    Thus service, parameters and diagnostics are served however fast the frames come.
+
+    Raises
+    ------
+    ParameterException, ParameterError
+        If a parameter is wrong.
+    OSError, ConfigurationError, WeightsError
+        If model or weights cannot be loaded.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("morph_node", **options)
+        declare_parameters(self)
+        settings = NodeSettings.check(read_parameters(self))
+        self._active = Active(settings, _load(settings))
+        self._statistics = FrameStatistics()
+        self._mailbox: Mailbox[Frame] = Mailbox()
+        self._camera_info: CameraInfo | None = None
+        self._image_without_info: Image | None = None
+        self._last_source, self._last_stamp = "", 0
+        self._warned: dict[str, float] = {}
+        self._connect(ReliabilityPolicy[settings.reliability.upper()])
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self._worker = threading.Thread(target=self._work, name="estimation")
+        self._worker.start()
+        self.get_logger().info(f"estimating morphing parameters of model '{settings.model}'")
+
+    def destroy_node(self) -> None:
+        """End the estimation thread and the node."""
+        self._mailbox.close()
+        self._worker.join()
+        super().destroy_node()
+
+    def _connect(self, reliability: ReliabilityPolicy) -> None:
+        self._parameters_publisher = self.create_publisher(
+            MorphingParameters, "morphing_parameters", QUEUE_DEPTH
+        )
+        self._model_publisher = self.create_publisher(MarkerArray, "morphed_model", QUEUE_DEPTH)
+        self._diagnostics_publisher = self.create_publisher(
+            DiagnosticArray, "/diagnostics", QUEUE_DEPTH
+        )
+        newest = QoSProfile(depth=1, reliability=reliability)
+        # Taken in this order where several came: an image after the camera_info published with it.
+        self.create_subscription(CameraInfo, "depth/camera_info", self._on_camera_info, newest)
+        self.create_subscription(Image, "depth/image", self._on_image, newest)
+        self.create_subscription(PointCloud2, "points", self._on_points, newest)
+        self.create_service(EstimateMorphing, "estimate_morphing", self._on_estimate)
+        # A steady clock: reports go on when a simulated time stops or jumps.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
+
+    def _on_points(self, cloud: PointCloud2) -> None:
+        self._submit("points", cloud.header, partial(points_from_cloud, cloud))
+
+    def _on_image(self, image: Image) -> None:
+        """Submit an image with the newest camera_info, or keep it until the first one comes."""
+        if self._camera_info is not None:
+            read = partial(points_from_depth, image, self._camera_info)
+            self._submit("depth/image", image.header, read)
+            return
+        if self._image_without_info is not None:
+            self._refuse("no_camera_info", "depth/image came without depth/camera_info")
+        self._image_without_info = image
+
+    def _on_camera_info(self, info: CameraInfo) -> None:
+        self._camera_info = info
+        image, self._image_without_info = self._image_without_info, None
+        if image is not None:
+            self._on_image(image)
+
+    def _submit(
+        self, source: str, header: Header, read: Callable[[float], NDArray[np.float32]]
+    ) -> None:
+        """Hand the newest frame to the estimation thread."""
+        stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
+        last_source, last_stamp = self._last_source, self._last_stamp
+        self._last_source, self._last_stamp = source, stamp
+        if stamp == last_stamp != 0 and source != last_source:
+            return  # one exposure, published both as cloud and as image
+        if stamp < last_stamp:
+            self._statistics.count_clock_jump()
+            self._warn(
+                "clock_jump", f"stamps went back from {last_stamp / 1e9} s to {stamp / 1e9} s"
+            )
+        replaced = self._mailbox.put(Frame(header, read, time.monotonic()))
+        self._statistics.receive(replaced)
+
+    def _on_estimate(
+        self, request: EstimateMorphing.Request, response: EstimateMorphing.Response
+    ) -> EstimateMorphing.Response:
+        read = partial(points_from_cloud, request.points)
+        self._statistics.receive(replaced=False)
+        answer = self._answer(Frame(request.points.header, read, time.monotonic()))
+        response.parameters = parameters_from_estimate(*answer)
+        return response
+
+    def _work(self) -> None:
+        """Estimate and publish frame after frame until the mailbox is closed."""
+        while (frame := self._mailbox.take()) is not None:
+            answer = self._answer(frame)
+            if self.context.ok():
+                self._parameters_publisher.publish(parameters_from_estimate(*answer))
+                self._model_publisher.publish(markers_from_estimate(*answer))
+
+    def _answer(self, frame: Frame) -> Answer:
+        """Estimate a frame; whatever is wrong with it becomes the reason of the answer."""
+        settings, pipeline = self._active
+        model = pipeline.estimator.model
+        header = Header(stamp=frame.header.stamp, frame_id=settings.world_frame)
+        try:
+            points = frame.read(settings.max_range)
+            estimate = pipeline.estimate(points, frame.header.frame_id == settings.world_frame)
+        except MessageError as error:
+            self._refuse(error.reason, str(error))
+            return Answer(model, Estimate.none(model, 0, Status.NO_OBJECT, str(error)), header)
+        except Exception as error:  # a node never dies of a message
+            self._refuse("internal_error", traceback.format_exc())
+            return Answer(model, Estimate.none(model, 0, Status.NO_OBJECT, repr(error)), header)
+        if estimate.status is not Status.OK:
+            self._warn(estimate.status.name, f"{estimate.status.name}: {estimate.reason}")
+        latency = time.monotonic() - frame.received
+        self._statistics.use(estimate.status.name, estimate.reason, latency)
+        return Answer(model, estimate, header)
+
+    def _refuse(self, reason: str, text: str) -> None:
+        self._statistics.refuse(reason, text)
+        self._warn(reason, f"message refused, {reason}: {text}")
+
+    def _warn(self, key: str, text: str) -> None:
+        """Log a warning, but not more often than once in a period for each key."""
+        now = time.monotonic()
+        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[key] = now
+            self.get_logger().warning(text)
+
+    def _report(self) -> None:
+        name = f"{self.get_fully_qualified_name()}: frames"
+        report = DiagnosticArray(status=[self._statistics.report(name, DIAGNOSTICS_PERIOD)])
+        report.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics_publisher.publish(report)
+
+    def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        """Take over changed parameters together, or refuse them with the reason."""
+        values = read_parameters(self)
+        values.update((p.name, p.value) for p in parameters if p.name in values)
+        before, pipeline = self._active
+        try:
+            settings = NodeSettings.check(values)
+            if (settings.model, settings.weights) != (before.model, before.weights):
+                pipeline = _load(settings)
+        except (OSError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        estimator = MorphEstimator(
+            pipeline.estimator.model, pipeline.estimator.network, settings.estimator
+        )
+        self._active = Active(settings, MorphPipeline(estimator, settings.pipeline))
+        return SetParametersResult(successful=True)
+
+
+def _load(settings: NodeSettings) -> MorphPipeline:
+    """Load model and weights, ready for the first frame."""
+    torch.set_num_threads(1)  # more are slower for these small networks
+    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
+    pipeline = MorphPipeline(estimator, settings.pipeline)
+    pipeline.warm_up()
+    return pipeline

@@ -1,0 +1,44 @@
+"""The executable ``morph_node``: ends without a traceback, whenever it is stopped."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> int:
+    """Run the executable ``morph_node``."""
+    try:
+        return _run()
+    except KeyboardInterrupt:
+        return 130
+
+
+def _run() -> int:
+    # Imported here, as torch takes seconds in which Ctrl-C shall be as quiet as later on.
+    import rclpy
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import ExternalShutdownException
+    from rclpy.signals import SignalHandlerOptions, install_signal_handlers
+    from rclpy.utilities import try_shutdown
+
+    from kmn_perception.morph_node import MorphNode
+
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = MorphNode()
+    except (OSError, ValueError, ParameterException) as error:
+        print(f"morph_node: {error}", file=sys.stderr)
+        return 1
+    install_signal_handlers(SignalHandlerOptions.ALL)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -18,7 +18,7 @@ fail() {
     exit 1
 }
 
-has_library() { /sbin/ldconfig -p | grep -q "$1"; }
+has_library() { [[ $(/sbin/ldconfig -p) == *"$1"* ]]; }
 
 # Debian packages that the use needs and this machine lacks, one a line.
 missing_packages() {

@@ -72,7 +72,7 @@ def save_picture(path: Path, overlay: Overlay) -> None:
 def save_contact_sheet(path: Path, overlays: Sequence[Overlay]) -> None:
     """Write all overlays side by side as one picture."""
     rows = math.ceil(len(overlays) / COLUMNS)
-    figure = Figure(figsize=(3 * COLUMNS, 2.7 * rows), dpi=100, layout="constrained")
+    figure = Figure(figsize=(3 * COLUMNS, 2.9 * rows), dpi=100, layout="constrained")
     for axes in figure.subplots(rows, COLUMNS, squeeze=False).flat:
         axes.set_axis_off()
     for axes, overlay in zip(figure.axes, overlays, strict=False):

@@ -1,0 +1,262 @@
+"""Show the estimation on real Kinect clouds: a bag, morph_node in another process, pictures."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from tqdm import tqdm
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception import resources
+from kmn_perception.bags import BagError
+from kmn_perception.camera import Camera
+from kmn_perception.estimator import Status
+from kmn_perception.example_bag import CAMERA, load_frames, make_example_bag
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.overlay import Overlay, save_contact_sheet, save_picture
+from kmn_perception.pipeline import PipelineSettings
+from kmn_perception.rendering import depth_to_points
+from kmn_perception.replay import Replay
+from kmn_perception.segmentation import remove_background
+from kmn_perception.support_plane import find_support_plane, pose_above
+
+POINTS, PARAMETERS = "/points", "morphing_parameters"
+RATE = 2.0  # frames a second
+REQUIRED = 15  # of the 17 frames
+START_TIMEOUT = 120.0  # seconds for morph_node to load and compile
+ANSWER_TIMEOUT = 20.0  # seconds for the parameters of one frame
+STOP_TIMEOUT = 10.0  # seconds for morph_node to end
+POLL_PERIOD = 0.1  # seconds
+LOG_LINES = 5  # of morph_node's, shown if it ends
+
+
+class DemoError(Exception):
+    """The demo cannot go on; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What morph_node made of a frame.
+
+    Attributes
+    ----------
+    parameters
+        Its message.
+    unit_cubes
+        (B, 4, 4) bodies of the estimated model, see `KinematicModel.unit_cubes`; B = 0 if there
+        is no estimate.
+    latency
+        Seconds from publishing the cloud to receiving the message.
+    """
+
+    parameters: MorphingParameters
+    unit_cubes: NDArray[np.float64]
+    latency: float
+
+    @property
+    def status(self) -> Status:
+        """What the parameters are worth."""
+        return Status(self.parameters.status)
+
+    def describe(self) -> list[str]:
+        """Return the place, and the sides with the residual; nothing if there is no estimate."""
+        values = dict(zip(self.parameters.theta_names, self.parameters.theta, strict=True))
+        yaw, residual = math.degrees(values["yaw"]), 1e3 * self.parameters.residual
+        texts = []
+        for cube in self.unit_cubes:
+            sides = 100.0 * np.linalg.norm(cube[:3, :3], axis=0)
+            texts.append(f"x {values['x']:6.3f} m  y {values['y']:6.3f} m  yaw {yaw:5.1f}°")
+            size = " x ".join(f"{side:4.1f}" for side in sides)
+            texts.append(f"{size} cm  residual {residual:4.1f} mm")
+        return texts
+
+
+class Listener:
+    """Waits for the morphing parameters of one frame after the other."""
+
+    def __init__(self, node: Node, model: KinematicModel) -> None:
+        self._model = model
+        self._received: dict[int, MorphingParameters] = {}
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        node.create_subscription(MorphingParameters, PARAMETERS, self._receive, 10)
+
+    def _receive(self, parameters: MorphingParameters) -> None:
+        self._received[Time.from_msg(parameters.header.stamp).nanoseconds] = parameters
+
+    def wait_for(self, stamp: int) -> Answer | None:
+        """Return the answer to the frame of this stamp in nanoseconds, None if there is none."""
+        start = time.monotonic()
+        while stamp not in self._received:
+            if time.monotonic() - start > ANSWER_TIMEOUT:
+                return None
+            self._executor.spin_once(timeout_sec=POLL_PERIOD)
+        latency = time.monotonic() - start
+        parameters = self._received[stamp]
+        cubes: NDArray[np.float64] = np.empty((0, 4, 4))
+        if np.isfinite([*parameters.theta, *parameters.gamma]).all():
+            cubes = self._model.unit_cubes(parameters.theta, parameters.gamma)
+        return Answer(parameters, cubes, latency)
+
+
+def node_arguments() -> list[str]:
+    """Return the arguments that set a node up for boxes on a table, in a namespace of its own."""
+    file = resources.find("config/nodes", "morph_node_tabletop")
+    alone = f"__ns:=/demo_{os.getpid()}"  # whatever else runs here is not disturbed
+    return ["--ros-args", "--params-file", str(file), "-p", "reliability:=reliable", "-r", alone]
+
+
+class MorphNodeProcess:
+    """Runs morph_node in another process, up to the end of the context; it writes to `log`."""
+
+    def __init__(self, log: Path) -> None:
+        self._log = log
+
+    def __enter__(self) -> MorphNodeProcess:
+        command = [sys.executable, "-m", "kmn_perception.start_morph_node", *node_arguments()]
+        with self._log.open("wb") as output:
+            self._process = subprocess.Popen(command, stdout=output, stderr=output)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def check(self) -> None:
+        """Raise a `DemoError` with the end of its output if the process has ended."""
+        if self._process.poll() is not None:
+            last = "\n".join(self._log.read_text(errors="replace").splitlines()[-LOG_LINES:])
+            raise DemoError(f"morph_node ended with exit code {self._process.returncode}:\n{last}")
+
+    def wait_until_ready(self, replay: Replay, node: Node) -> None:
+        """Wait until morph_node listens and speaks; raise a `DemoError` if it does not."""
+        deadline = time.monotonic() + START_TIMEOUT
+        while not (replay.wait_for_subscriber(POLL_PERIOD) and node.count_publishers(PARAMETERS)):
+            self.check()
+            if time.monotonic() > deadline:
+                raise DemoError(f"morph_node was not ready within {START_TIMEOUT:g} s")
+
+
+def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> list[Answer | None]:
+    """Replay the bag into morph_node, print its answers and return them; None for no answer.
+
+    Raises
+    ------
+    DemoError
+        If morph_node does not start, or ends.
+    """
+    answers = []
+    with MorphNodeProcess(log) as process:
+        listener, replay = Listener(node, model), Replay(node, bag, [POINTS], {POINTS: "points"})
+        process.wait_until_ready(replay, node)
+        for number, message in enumerate(replay.play()):
+            answer = listener.wait_for(message.stamp)
+            answers.append(answer)
+            if answer:
+                texts = [*answer.describe(), f"{1e3 * answer.latency:4.0f} ms", answer.status.name]
+                print(f"frame {number:2d}", *texts, answer.parameters.reason, sep="  ", flush=True)
+            else:
+                process.check()
+                print(f"frame {number:2d}  no answer within {ANSWER_TIMEOUT:g} s", flush=True)
+    return answers
+
+
+def draw_frames(
+    answers: Sequence[Answer | None], model: KinematicModel, settings: PipelineSettings
+) -> Iterator[Overlay]:
+    """Yield the picture of each frame: the points of its object and the estimated model."""
+    intrinsics = Camera.load(CAMERA)
+    for number, (depth, answer) in enumerate(zip(load_frames(), answers, strict=True)):
+        points = depth_to_points(depth, intrinsics)
+        plane = find_support_plane(points, settings.plane)
+        pose = model.camera.pose if plane is None else pose_above(plane, model.camera.pose)
+        texts = [*answer.describe(), answer.status.name] if answer else ["no answer"]
+        yield Overlay(
+            depth=depth,
+            camera=replace(intrinsics, pose=pose),
+            points=remove_background(points, pose, pose[:3, 3], settings.background),
+            unit_cubes=answer.unit_cubes if answer else np.empty((0, 4, 4)),
+            accepted=answer is not None and answer.status is Status.OK,
+            title=f"frame {number}: {texts.pop()}\n" + "\n".join(texts),
+        )
+
+
+def save_pictures(overlays: Iterator[Overlay], count: int, folder: Path) -> Path:
+    """Write a picture of each frame, and one of all; return the latter's path."""
+    drawn = []
+    for number, overlay in enumerate(tqdm(overlays, "drawing", count, unit="frame")):
+        save_picture(folder / f"frame_{number:02d}.png", overlay)
+        drawn.append(overlay)
+    save_contact_sheet(folder / "all_frames.png", drawn)
+    return folder / "all_frames.png"
+
+
+def run(folder: Path) -> int:
+    """Run the demo in a folder; return the number of frames with status OK.
+
+    Raises
+    ------
+    BagError, DemoError
+        If it cannot go on.
+    """
+    bag, log = folder / "kinect_boxes", folder / "morph_node.log"
+    shutil.rmtree(bag, ignore_errors=True)
+    make_example_bag(bag, RATE)
+    node = rclpy.create_node("demo", cli_args=node_arguments())
+    declare_parameters(node)
+    settings = NodeSettings.check(read_parameters(node))
+    model = KinematicModel.load(settings.model)
+    print(f"starting morph_node, which logs to {log}", flush=True)
+    answers = estimate_frames(node, model, bag, log)
+    overlays = draw_frames(answers, model, settings.pipeline)
+    sheet = save_pictures(overlays, len(answers), folder)
+    accepted = sum(answer is not None and answer.status is Status.OK for answer in answers)
+    print(f"{accepted} of {len(answers)} frames have status OK, {REQUIRED} are needed")
+    print(f"all frames: {sheet}\none by one: {folder / 'frame_00.png'} ...")
+    return accepted
+
+
+def main() -> int:
+    """Run the executable ``demo_bag``."""
+    parser = argparse.ArgumentParser(prog="demo_bag", description=__doc__)
+    parser.add_argument(
+        "--out", type=Path, default=Path("outputs/demo"), help="folder of the bag and the pictures"
+    )
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends morph_node too
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        return 0 if run(options.out) >= REQUIRED else 1
+    except (BagError, DemoError) as error:
+        print(f"demo_bag: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    finally:
+        rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
@@ -19,6 +20,19 @@ def absolute_errors(
     return np.abs(model.nearest_equivalent(values, truth) - truth)
 
 
+def values_by_step(
+    model: KinematicModel, network: MorphNetwork, clouds: Clouds
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the estimates (B, n + m) after 0, 1, ... predictions, without end.
+
+    Before the first prediction it is the start of Algorithm 1 with gamma_0 = 0.
+    """
+    theta = start(model, clouds)
+    yield np.concatenate((theta, np.zeros((len(theta), len(model.gamma)))), axis=1)
+    for state in predictions(model, network, clouds, theta):
+        yield state.values
+
+
 def errors_by_step(
     model: KinematicModel,
     network: MorphNetwork,
@@ -26,11 +40,6 @@ def errors_by_step(
     truth: NDArray[np.float64],
     steps: int,
 ) -> NDArray[np.float64]:
-    """Return the absolute errors (steps + 1, B, n + m) after 0, 1, ..., ``steps`` predictions.
-
-    Before the first prediction the estimate is the start of Algorithm 1 with gamma_0 = 0.
-    """
-    theta = start(model, clouds)
-    values = [np.concatenate((theta, np.zeros((len(theta), len(model.gamma)))), axis=1)]
-    values += [state.values for state in islice(predictions(model, network, clouds, theta), steps)]
-    return absolute_errors(model, np.stack(values), truth)
+    """Return the absolute errors (steps + 1, B, n + m) after 0, 1, ..., ``steps`` predictions."""
+    values = np.stack(list(islice(values_by_step(model, network, clouds), steps + 1)))
+    return absolute_errors(model, values, truth)

@@ -17,7 +17,7 @@ MSGS_SOURCES := $(shell find src/kmn_msgs -type f -not -path '*/test/*')
 PYTHON_SOURCES := colcon.meta $(shell find -L $(PYTHON_PACKAGES:%=src/%) \
     -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' \
     -not -path '*.egg-info*')
-CHECKED := src/*/test test
+TESTS := $(wildcard src/*/test) test
 
 .PHONY: help
 help:  ## list the targets
@@ -33,7 +33,7 @@ demo: build  ## estimate boxes on real Kinect clouds, through a bag and the node
 .PHONY: test
 test: build lint  ## run the style checks and all tests
 	@echo "==> Testing"
-	@. install/setup.bash && .venv/bin/python -m pytest $(CHECKED)
+	@. install/setup.bash && .venv/bin/python -m pytest $(TESTS)
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) and types (mypy)
@@ -41,6 +41,7 @@ lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) an
 	@.venv/bin/ruff check --quiet .
 	@.venv/bin/ruff format --quiet --check .
 	@.venv/bin/mypy --no-error-summary
+	@for folder in tools $(TESTS); do .venv/bin/mypy --no-error-summary $$folder || exit; done
 
 .PHONY: setup-training setup-evaluation setup-test
 setup-training: $(READY)training  ## install what the training needs

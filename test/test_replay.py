@@ -12,14 +12,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import domain_coordinator
 import numpy as np
 import pytest
-import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rosbags.interfaces import (
     Qos,
@@ -40,43 +38,37 @@ from kmn_perception.replay import Replay
 
 STRING = "std_msgs/msg/String"
 PATIENCE = 20.0  # seconds; far more than anything here takes
-RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+QUEUE_DEPTH = 100
 NO_LIMIT = QosTime(9223372036, 854775807)
 
 
 @pytest.fixture
-def domain() -> Iterator[int]:
-    """Return a ROS domain of our own."""
-    with domain_coordinator.domain_id() as number:
-        yield number
-
-
-@pytest.fixture
-def context(domain: int) -> Iterator[Context]:
+def player(domain: int) -> Iterator[Node]:
+    """Return the node that replays, and that listens to what is replayed."""
     context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.shutdown(context=context)
+    context.init(domain_id=domain)
+    node = Node("player", context=context)
+    yield node
+    node.destroy_node()
+    context.shutdown()
 
 
-class Ear:
-    """A node that keeps all it hears."""
+def listen(
+    node: Node, message_type: Any, topic: str, qos: QoSProfile | int = QUEUE_DEPTH
+) -> list[Any]:
+    """Return the list of all that will be heard of a topic."""
+    heard: list[Any] = []
+    node.create_subscription(message_type, topic, heard.append, qos)
+    return heard
 
-    def __init__(self, context: Context) -> None:
-        self.node = Node("ear", context=context)
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(self.node)
 
-    def listen(self, message_type: Any, topic: str, qos: QoSProfile = RELIABLE) -> list[Any]:
-        heard: list[Any] = []
-        self.node.create_subscription(message_type, topic, heard.append, qos)
-        return heard
-
-    def spin_until(self, done: Callable[[], bool]) -> bool:
-        deadline = time.monotonic() + PATIENCE
-        while not done() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.05)
-        return done()
+def spin_until(node: Node, done: Callable[[], bool]) -> bool:
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    deadline = time.monotonic() + PATIENCE
+    while not done() and time.monotonic() < deadline:
+        executor.spin_once(timeout_sec=0.05)
+    return done()
 
 
 def _said(topic: str, milliseconds: int, text: str) -> Message:
@@ -102,14 +94,13 @@ def talk(tmp_path: Path) -> Path:
     return tmp_path / "talk"
 
 
-def test_every_message_arrives_as_it_was_recorded(context: Context, tmp_path: Path) -> None:
+def test_every_message_arrives_as_it_was_recorded(player: Node, tmp_path: Path) -> None:
     talk = _write_talk(tmp_path / "talk")
-    ear = Ear(context)
-    a, b = ear.listen(String, "a"), ear.listen(String, "b")
-    replay = Replay(ear.node, tmp_path / "talk")
+    a, b = listen(player, String, "a"), listen(player, String, "b")
+    replay = Replay(player, tmp_path / "talk")
     assert replay.wait_for_subscriber(PATIENCE)
     assert list(replay.play(rate=10.0)) == talk
-    assert ear.spin_until(lambda: len(a) + len(b) == len(talk))
+    assert spin_until(player, lambda: len(a) + len(b) == len(talk))
     assert [message.data for message in a] == ["a0", "a1", "a2"]
     assert [message.data for message in b] == ["b0", "b1"]
 
@@ -130,31 +121,31 @@ class Clock:
 
 @pytest.mark.parametrize("rate", [0.5, 1.0, 4.0])
 def test_the_pace_is_the_recorded_one_times_the_rate_and_does_not_drift(
-    rate: float, context: Context, talk: Path, monkeypatch: pytest.MonkeyPatch
+    rate: float, player: Node, talk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(replay_module, "time", clock)
     published = []
-    for _ in Replay(Node("player", context=context), talk).play(rate):
+    for _ in Replay(player, talk).play(rate):
         published.append(clock.now - 100.0)
         clock.now += 0.002
     assert published == pytest.approx([t / rate for t in (0.0, 0.010, 0.020, 0.070, 0.200)])
 
 
 def test_late_messages_follow_at_once_and_those_after_them_are_on_time(
-    context: Context, talk: Path, monkeypatch: pytest.MonkeyPatch
+    player: Node, talk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(replay_module, "time", clock)
     published = []
-    for message in Replay(Node("player", context=context), talk).play():
+    for message in Replay(player, talk).play():
         published.append(clock.now - 100.0)
         clock.now += 0.100 if message.topic == "/b" else 0.0
     assert published == pytest.approx([0.0, 0.010, 0.110, 0.110, 0.200])
 
 
-def test_topics_can_be_chosen(context: Context, talk: Path) -> None:
-    replay = Replay(Node("player", context=context), talk, topics=["/b"])
+def test_topics_can_be_chosen(player: Node, talk: Path) -> None:
+    replay = Replay(player, talk, topics=["/b"])
     assert replay.count == 2
     assert {message.topic for message in replay.play(rate=10.0)} == {"/b"}
 
@@ -167,7 +158,7 @@ def _qos(durability: QosDurability) -> Qos:
     )  # fmt: skip
 
 
-def test_a_foreign_bag_is_replayed_under_other_names(context: Context, tmp_path: Path) -> None:
+def test_a_foreign_bag_is_replayed_under_other_names(player: Node, tmp_path: Path) -> None:
     """The bag is serialised and laid out by rosbags alone."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types, type_name = store.types, "sensor_msgs/msg/PointCloud2"
@@ -183,19 +174,18 @@ def test_a_foreign_bag_is_replayed_under_other_names(context: Context, tmp_path:
             offered_qos_profiles=[_qos(QosDurability.VOLATILE)],
         )  # fmt: skip
         writer.write(connection, 10**18, store.serialize_cdr(cloud, type_name))
-    ear = Ear(context)
-    heard = ear.listen(PointCloud2, "points")
-    replay = Replay(ear.node, tmp_path / "bag", topic_map={"/camera/depth/points": "points"})
+    heard = listen(player, PointCloud2, "points")
+    replay = Replay(player, tmp_path / "bag", topic_map={"/camera/depth/points": "points"})
     assert replay.wait_for_subscriber(PATIENCE)
     list(replay.play())
-    assert ear.spin_until(lambda: bool(heard))
+    assert spin_until(player, lambda: bool(heard))
     (message,) = heard
     assert (message.header.frame_id, message.header.stamp.sec) == ("camera", 5)
     assert [field.name for field in message.fields] == ["x", "y", "z"]
     assert message.data == array("B", points.tobytes())
 
 
-def test_latched_topics_reach_those_who_come_late(context: Context, tmp_path: Path) -> None:
+def test_latched_topics_reach_those_who_come_late(player: Node, tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         for topic, durability in (
@@ -205,18 +195,17 @@ def test_latched_topics_reach_those_who_come_late(context: Context, tmp_path: Pa
                 topic, STRING, typestore=store, offered_qos_profiles=[_qos(durability)]
             )
             writer.write(connection, 0, serialize_message(String(data=topic)))
-    ear = Ear(context)
-    replay = Replay(ear.node, tmp_path / "bag")
+    replay = Replay(player, tmp_path / "bag")
     list(replay.play())
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    now, ever = ear.listen(String, "now"), ear.listen(String, "ever", latched)
-    assert ear.spin_until(lambda: bool(ever))
+    now, ever = listen(player, String, "now"), listen(player, String, "ever", latched)
+    assert spin_until(player, lambda: bool(ever))
     assert ever[0].data == "/ever"
     assert not now
 
 
 def test_unknown_message_packages_are_skipped_with_a_message(
-    context: Context, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    player: Node, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     store.register(get_types_from_msg("int32 weight", "acme_msgs/msg/Anvil"))
@@ -225,19 +214,18 @@ def test_unknown_message_packages_are_skipped_with_a_message(
         said = writer.add_connection("/said", STRING, typestore=store)
         writer.write(anvil, 0, bytes(8))
         writer.write(said, 1, serialize_message(String(data="hello")))
-    replay = Replay(Node("player", context=context), tmp_path / "bag")
+    replay = Replay(player, tmp_path / "bag")
     assert [message.topic for message in replay.play()] == ["/said"]
     assert "skipping /anvil: message type acme_msgs/msg/Anvil is not" in capfd.readouterr().err
     with pytest.raises(BagError, match="nothing to publish"):
-        Replay(Node("player", context=context), tmp_path / "bag", topics=["/anvil"])
+        Replay(player, tmp_path / "bag", topics=["/anvil"])
 
 
-def test_a_topic_that_is_not_recorded_is_refused(context: Context, talk: Path) -> None:
-    node = Node("player", context=context)
+def test_a_topic_that_is_not_recorded_is_refused(player: Node, talk: Path) -> None:
     with pytest.raises(BagError, match="no topic /points; the bag holds /a, /b"):
-        Replay(node, talk, topics=["/points"])
+        Replay(player, talk, topics=["/points"])
     with pytest.raises(BagError, match="no topic /depth; the bag holds /a, /b"):
-        Replay(node, talk, topic_map={"/depth": "/a"})
+        Replay(player, talk, topic_map={"/depth": "/a"})
 
 
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:
@@ -271,13 +259,12 @@ def test_bad_arguments_end_with_a_message(
 
 
 def test_ctrl_c_ends_an_endless_replay_without_a_traceback(
-    domain: int, context: Context, talk: Path
+    domain: int, player: Node, talk: Path
 ) -> None:
-    ear = Ear(context)
-    heard = ear.listen(String, "a")
+    heard = listen(player, String, "a")
     process = _run_replay(domain, str(talk), "--loop")
     try:
-        assert ear.spin_until(lambda: len(heard) > 6), "it does not start again at the end"
+        assert spin_until(player, lambda: len(heard) > 6), "it does not start again at the end"
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=60)
     finally:

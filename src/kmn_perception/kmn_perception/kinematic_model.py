@@ -69,8 +69,8 @@ class NetworkInput:
     ----------
     width, height
         Size in pixels.
-    depth_scale
-        Depths are told apart best within this distance of the prototype, metres.
+    near, far
+        Depths in metres that become 1 and (almost) 0; 0 itself is the background.
     supersampling
         The cloud is splatted on a grid this many times finer, then averaged.
     max_gap
@@ -79,7 +79,8 @@ class NetworkInput:
 
     width: int
     height: int
-    depth_scale: float
+    near: float
+    far: float
     supersampling: int
     max_gap: int
 
@@ -296,11 +297,13 @@ def _joints(
 
 
 def _input(section: Section) -> NetworkInput:
-    section.allow(("width", "height", "depth_scale", "supersampling", "max_gap"))
+    section.allow(("width", "height", "near", "far", "supersampling", "max_gap"))
+    near = section.number("near", 0.0, 1e3)
     return NetworkInput(
         width=section.whole_number("width", 32, 4096),
         height=section.whole_number("height", 32, 4096),
-        depth_scale=section.number("depth_scale", 1e-3, 1e3),
+        near=near,
+        far=section.number("far", near, 1e3),
         supersampling=section.whole_number("supersampling", 1, 8),
         max_gap=section.whole_number("max_gap", 0, 64),
     )

@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
 from kmn_perception.kinematic_model import KinematicModel
+
+FARTHEST = 1.0 / 256.0  # what is farther than ``far`` still differs from the background
 
 
 def point_cloud_to_depth(
@@ -28,9 +29,7 @@ def point_cloud_to_depth(
     Returns
     -------
     depth
-        (height, width) values in [0, 1]: 0 is the background, above it nearer is larger. They are
-        1/2 at the upright plane through the prototype's origin that faces the camera, and steepest
-        there, so that what is near the prototype shows in contrast.
+        (height, width) values in [0, 1]: 0 is the background, 1 the nearest depth.
     """
     image, fine = model.input, model.input.supersampling
     camera = model.camera.resized(image.width * fine, image.height * fine)
@@ -44,7 +43,7 @@ def point_cloud_to_depth(
     filled = buffer[v0 : v1 + 1, u0 : u1 + 1]
     _close_gaps(filled, image.max_gap)
     _close_gaps(filled.T, image.max_gap)
-    return _normalise(buffer, fine, _reference_depth(camera), image.depth_scale)
+    return _normalise(buffer, fine, image.near, image.far)
 
 
 @njit(cache=True)
@@ -92,22 +91,14 @@ def _close_gaps(buffer: NDArray[np.float32], max_gap: int) -> None:
 
 @njit(cache=True)
 def _normalise(
-    buffer: NDArray[np.float32], block: int, reference: NDArray[np.float32], depth_scale: float
+    buffer: NDArray[np.float32], block: int, near: float, far: float
 ) -> NDArray[np.float32]:
-    """Map depths to (0, 1), background to 0, and average over blocks of pixels."""
+    """Map depths linearly to (0, 1], background to 0, and average over blocks of pixels."""
     height, width = buffer.shape[0] // block, buffer.shape[1] // block
     depth = np.zeros((height, width), dtype=np.float32)
     for row in range(height * block):
         for column in range(width * block):
             if not np.isinf(buffer[row, column]):
-                nearer = (reference[row] - buffer[row, column]) / depth_scale
-                depth[row // block, column // block] += 0.5 + 0.5 * nearer / (1.0 + abs(nearer))
+                value = (far - buffer[row, column]) / (far - near)
+                depth[row // block, column // block] += min(1.0, max(FARTHEST, value))
     return depth / np.float32(block * block)
-
-
-def _reference_depth(camera: Camera) -> NDArray[np.float32]:
-    """Return, for each row (height,), the depth of the upright plane through the origin, metres."""
-    forward = camera.pose[:3, 2] * [1.0, 1.0, 0.0]
-    slope = (np.arange(camera.height) - camera.cy) / camera.fy
-    along_ray = camera.pose[:3, 2] @ forward + slope * (camera.pose[:3, 1] @ forward)
-    return (-(camera.pose[:3, 3] @ forward) / along_ray).astype(np.float32)

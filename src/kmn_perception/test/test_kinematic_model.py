@@ -75,7 +75,7 @@ def test_quarter_turn_with_swapped_scales_is_the_same_box() -> None:
         (("gamma", 0, "name"), "x", "names must differ"),
         (("bodies", "panel", "size"), [1, {"depth": 1}, 1], "unknown key 'depth' in 'size'"),
         (("joints", "hinge", "body"), "wing", "'body' must be one of panel, handle"),
-        (("input", "depth_scale"), -1.0, "input: 'depth_scale' must be a number in"),
+        (("input", "near"), -1.0, "input: 'near' must be a number in"),
         (("symmetry",), "quarter_turn", "needs a rotation about z and scales"),
     ],
 )

@@ -74,11 +74,9 @@ class Client(Node):
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self.answers.append, 10000
         )
-        self.create_subscription(
-            MarkerArray, "morphed_model", lambda array: self.overlays.append(array.markers), 10000
-        )
+        self.create_subscription(MarkerArray, "morphed_model", self._keep_overlay, 10000)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._keep_report, 10)
-        self.create_subscription(Log, "/rosout", lambda log: self.log.append(log.msg), 100)
+        self.create_subscription(Log, "/rosout", self._keep_log, 100)
         self.estimation = self.create_client(EstimateMorphing, "estimate_morphing")
         self.setting = self.create_client(
             SetParametersAtomically, "morph_node/set_parameters_atomically"
@@ -87,6 +85,12 @@ class Client(Node):
     def _keep_report(self, report: DiagnosticArray) -> None:
         status = report.status[0]
         self.reports.append({value.key: value.value for value in status.values})
+
+    def _keep_overlay(self, overlay: MarkerArray) -> None:
+        self.overlays.append(overlay.markers)
+
+    def _keep_log(self, log: Log) -> None:
+        self.log.append(log.msg)
 
     def connect(self) -> None:
         """Wait until morph_node hears and is heard."""
@@ -210,7 +214,7 @@ def client(graph: Any, node: MorphNode) -> Client:
 @pytest.fixture
 def restored(client: Client, node: MorphNode) -> Iterator[None]:
     """Give all parameters their former values back after the test."""
-    values = {name: node.get_parameter(name).value for name in DESCRIPTORS}
-    del values["reliability"]  # is read-only
+    changeable = [name for name in DESCRIPTORS if not DESCRIPTORS[name].read_only]
+    values = {name: node.get_parameter(name).value for name in changeable}
     yield
     assert client.set(**values).successful

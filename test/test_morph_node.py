@@ -222,3 +222,14 @@ def test_clock_jumps_are_counted_and_tolerated(client: Any) -> None:
     assert int(client.report()["clock_jumps"]) == before + 3
     assert any("stamps went back" in line for line in client.log)
     assert_answers_well(client)
+
+
+def test_diagnostics_tell_rate_latency_and_the_last_status(client: Any) -> None:
+    assert_answers_well(client)
+    report = client.report()
+    assert float(report["rate_hz"]) >= 1.0
+    assert 0.0 < float(report["latency_mean_ms"]) <= float(report["latency_max_ms"])
+    assert report["last"].startswith(("OK", "NOT_CONVERGED", "OUT_OF_LIMITS"))
+    idle = client.report()
+    assert float(idle["rate_hz"]) == float(idle["latency_max_ms"]) == 0.0
+    assert idle["frames_used"] == report["frames_used"]

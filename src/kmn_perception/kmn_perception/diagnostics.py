@@ -13,7 +13,7 @@ class FrameStatistics:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._received = self._dropped = self._clock_jumps = 0
+        self._received = self._lost = self._dropped = self._clock_jumps = 0
         self._refused: Counter[str] = Counter()
         self._statuses: Counter[str] = Counter()
         self._latencies: list[float] = []
@@ -24,6 +24,11 @@ class FrameStatistics:
         with self._lock:
             self._received += 1
             self._dropped += replaced
+
+    def lose(self, count: int) -> None:
+        """Count frames that never came in: lost on the way, or replaced before they were taken."""
+        with self._lock:
+            self._lost += count
 
     def count_clock_jump(self) -> None:
         """Count a stamp that lies before the one received last."""
@@ -46,7 +51,7 @@ class FrameStatistics:
         text
             Why it is not OK.
         latency
-            Seconds from reception to publication.
+            Seconds from the reception of the frame to its estimate.
         """
         with self._lock:
             self._statuses[status] += 1
@@ -71,6 +76,7 @@ class FrameStatistics:
                 "latency_mean_ms": f"{1e3 * sum(latencies) / max(len(latencies), 1):.2f}",
                 "latency_max_ms": f"{1e3 * max(latencies, default=0.0):.2f}",
                 "frames_received": str(self._received),
+                "frames_lost": str(self._lost),
                 "frames_used": str(used),
                 "frames_dropped": str(self._dropped),
                 "frames_refused": str(self._refused.total()),

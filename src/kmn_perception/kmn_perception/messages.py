@@ -79,7 +79,9 @@ def points_from_cloud(cloud: PointCloud2, max_range: float) -> NDArray[np.float3
             )
     reach = np.maximum(np.abs(points[..., 0]), np.abs(points[..., 1]))
     np.maximum(reach, np.abs(points[..., 2]), out=reach)
-    points[~_measured(reach, max_range)] = np.nan
+    missing = ~_measured(reach, max_range)
+    for axis in range(3):  # several times faster than all three at once
+        points[..., axis][missing] = np.nan
     return points if cloud.height > 1 else points[0]
 
 

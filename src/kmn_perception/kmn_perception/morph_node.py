@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -94,6 +94,7 @@ class MorphNode(Node):
         self._camera_info: CameraInfo | None = None
         self._image_without_info: Image | None = None
         self._last_source, self._last_stamp = "", 0
+        self._sequence: dict[str, int] = {}
         self._warned: dict[str, float] = {}
         self._connect(ReliabilityPolicy[settings.reliability.upper()])
         self.add_on_set_parameters_callback(self._on_parameters)
@@ -117,32 +118,43 @@ class MorphNode(Node):
         )
         newest = QoSProfile(depth=1, reliability=reliability)
         # Taken in this order where several came: an image after the camera_info published with it.
+        # rclpy calls with the message's info too, of which its annotations know nothing.
         self.create_subscription(CameraInfo, "depth/camera_info", self._on_camera_info, newest)
-        self.create_subscription(Image, "depth/image", self._on_image, newest)
-        self.create_subscription(PointCloud2, "points", self._on_points, newest)
+        self.create_subscription(Image, "depth/image", self._on_image, newest)  # type: ignore[arg-type]
+        self.create_subscription(PointCloud2, "points", self._on_points, newest)  # type: ignore[arg-type]
         self.create_service(EstimateMorphing, "estimate_morphing", self._on_estimate)
         # A steady clock: reports go on when a simulated time stops or jumps.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
 
-    def _on_points(self, cloud: PointCloud2) -> None:
+    def _on_points(self, cloud: PointCloud2, info: Mapping[str, Any]) -> None:
+        self._count_lost("points", info)
         self._submit("points", cloud.header, partial(points_from_cloud, cloud))
 
-    def _on_image(self, image: Image) -> None:
+    def _on_image(self, image: Image, info: Mapping[str, Any]) -> None:
         """Submit an image with the newest camera_info, or keep it until the first one comes."""
+        self._count_lost("depth/image", info)
         if self._camera_info is not None:
-            read = partial(points_from_depth, image, self._camera_info)
-            self._submit("depth/image", image.header, read)
+            self._submit_image(image, self._camera_info)
             return
         if self._image_without_info is not None:
             self._refuse("no_camera_info", "depth/image came without depth/camera_info")
         self._image_without_info = image
 
-    def _on_camera_info(self, info: CameraInfo) -> None:
-        self._camera_info = info
+    def _on_camera_info(self, camera_info: CameraInfo) -> None:
+        self._camera_info = camera_info
         image, self._image_without_info = self._image_without_info, None
         if image is not None:
-            self._on_image(image)
+            self._submit_image(image, camera_info)
+
+    def _count_lost(self, topic: str, info: Mapping[str, Any]) -> None:
+        """Count the messages of a topic's publisher between this one and the one before."""
+        number = info["publication_sequence_number"]
+        self._statistics.lose(max(0, number - self._sequence.get(topic, number) - 1))
+        self._sequence[topic] = number
+
+    def _submit_image(self, image: Image, camera_info: CameraInfo) -> None:
+        self._submit("depth/image", image.header, partial(points_from_depth, image, camera_info))
 
     def _submit(
         self, source: str, header: Header, read: Callable[[float], NDArray[np.float32]]

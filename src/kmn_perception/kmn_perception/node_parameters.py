@@ -65,8 +65,11 @@ class NodeSettings:
         ParameterError
             If one is wrong.
         """
-        for name, value in values.items():
-            _check_finite(name, value)
+        for name, length in LENGTHS.items():
+            if len(values[name]) != length or not np.isfinite(values[name]).all():
+                raise ParameterError(
+                    f"'{name}' must be {length} finite numbers, found {list(values[name])}"
+                )
         _check_choice("reliability", values["reliability"], RELIABILITIES)
         _check_choice("camera_pose", values["camera_pose"], CAMERA_POSES)
         for name in ("model", "world_frame"):
@@ -117,16 +120,6 @@ def read_parameters(node: Node) -> dict[str, Any]:
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ParameterError(f"'{name}' must be one of {', '.join(choices)}, found '{value}'")
-
-
-def _check_finite(name: str, value: Any) -> None:
-    """Raise if a number is NaN or infinite (which ranges let through), or a list too long."""
-    if isinstance(value, str):
-        return
-    if not np.isfinite(value).all():
-        raise ParameterError(f"'{name}' must be finite, found {value}")
-    if name in LENGTHS and len(value) != LENGTHS[name]:
-        raise ParameterError(f"'{name}' must be {LENGTHS[name]} numbers, found {list(value)}")
 
 
 def _pose(position: Any, quaternion: Any) -> NDArray[np.float64]:

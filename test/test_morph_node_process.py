@@ -1,0 +1,75 @@
+"""The installed executable morph_node: from any folder, ends quietly, says why it cannot start."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ament_index_python.packages import get_package_prefix
+from rclpy.node import Node
+
+from kmn_msgs.srv import EstimateMorphing
+
+EXECUTABLE = "lib/kmn_perception/morph_node"
+TIMEOUT = 60.0  # seconds
+
+
+def start(domain: int, folder: Path, *parameters: str) -> subprocess.Popen[str]:
+    arguments = [word for parameter in parameters for word in ("-p", parameter)]
+    return subprocess.Popen(
+        [f"{get_package_prefix('kmn_perception')}/{EXECUTABLE}", "--ros-args", *arguments],
+        cwd=folder,
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_node_ends_quietly_when_it_is_stopped(
+    graph: Any,
+    domain: int,
+    tmp_path: Path,
+    untrained: Callable[[str], Path],
+    stop: signal.Signals,
+) -> None:
+    process = start(domain, tmp_path, f"weights:={untrained('door')}")
+    watcher = graph.start(lambda context: Node("watcher", context=context))
+    client = watcher.create_client(EstimateMorphing, "estimate_morphing")
+    try:
+        assert client.wait_for_service(TIMEOUT)
+        process.send_signal(stop)
+        output, _ = process.communicate(timeout=TIMEOUT)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "Traceback" not in output
+
+
+def test_node_that_is_interrupted_while_it_starts_ends_quietly(
+    domain: int, tmp_path: Path, untrained: Callable[[str], Path]
+) -> None:
+    process = start(domain, tmp_path, f"weights:={untrained('door')}")
+    try:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.communicate(timeout=1.0)  # it imports
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=TIMEOUT)
+    finally:
+        process.kill()
+    assert "Traceback" not in output
+
+
+def test_node_that_cannot_start_says_why_in_one_line(domain: int, tmp_path: Path) -> None:
+    (tmp_path / "weights.safetensors").write_bytes(b"\x10\0\0\0\0\0\0\0not safetensors")
+    process = start(domain, tmp_path, "weights:=weights.safetensors")
+    output, _ = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 1
+    assert "weights.safetensors is not a readable safetensors file" in output
+    assert len(output.splitlines()) == 1

@@ -30,7 +30,7 @@ from kmn_perception.morph_node import MorphNode
 from kmn_perception.network import MorphNetwork
 from kmn_perception.node_parameters import DESCRIPTORS
 
-TIMEOUT = 30.0  # seconds until a test gives up to wait
+TIMEOUT = 60.0  # seconds until a test gives up to wait
 
 Found = TypeVar("Found")
 

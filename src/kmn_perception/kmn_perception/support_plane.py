@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 SEED = 0
@@ -133,9 +134,25 @@ def _best_hypothesis(
     if not level.any():
         return None
     normals, heights = normals[level], heights[level]
-    inliers = np.abs(points @ normals.T + heights) <= settings.distance
-    best = int(np.argmax(inliers.sum(axis=0)))
+    best = np.argmax(_count_inliers(points, normals, heights, settings.distance))
     return SupportPlane(normals[best], float(heights[best]))
+
+
+@njit(cache=True)
+def _count_inliers(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    heights: NDArray[np.float64],
+    distance: float,
+) -> NDArray[np.int64]:
+    """Count the points (N, 3) near each plane (K,): in one thread, which BLAS would not be."""
+    counts = np.zeros(len(normals), dtype=np.int64)
+    for k in range(len(normals)):
+        x, y, z = normals[k, 0], normals[k, 1], normals[k, 2]
+        for i in range(len(points)):
+            height = x * points[i, 0] + y * points[i, 1] + z * points[i, 2] + heights[k]
+            counts[k] += abs(height) <= distance
+    return counts
 
 
 def _on_plane(

@@ -98,7 +98,8 @@ class MorphNode(Node):
         self._warned: dict[str, float] = {}
         self._connect(ReliabilityPolicy[settings.reliability.upper()])
         self.add_on_set_parameters_callback(self._on_parameters)
-        self._worker = threading.Thread(target=self._work, name="estimation")
+        # A daemon, so that an interrupt in this very moment does not leave the process waiting.
+        self._worker = threading.Thread(target=self._work, name="estimation", daemon=True)
         self._worker.start()
         self.get_logger().info(f"estimating morphing parameters of model '{settings.model}'")
 

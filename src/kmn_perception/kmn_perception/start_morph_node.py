@@ -6,11 +6,11 @@ import sys
 
 
 def main() -> int:
-    """Run the executable ``morph_node``."""
+    """Run the executable ``morph_node``; being interrupted is its normal end."""
     try:
         return _run()
     except KeyboardInterrupt:
-        return 130
+        return 0
 
 
 def _run() -> int:
@@ -32,7 +32,7 @@ def _run() -> int:
     install_signal_handlers(SignalHandlerOptions.ALL)
     try:
         rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     finally:
         node.destroy_node()

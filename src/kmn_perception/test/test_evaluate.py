@@ -6,7 +6,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -182,9 +181,12 @@ def test_samples_are_seen_as_in_training_unless_noise_is_given(tmp_path: Path) -
         (["--model", "boat"], "'boat' is neither a file nor one of the shipped config/models"),
         (["--methods", "icp"], "icp does not apply to 'door'"),
         (["--methods", "magic"], "invalid choice: 'magic'"),
-        (["--seed", "-1"], "-1 is negative"),
-        (["--samples", "0"], "0 is not positive"),
-        (["--json", "nowhere/result.json"], "there is no folder nowhere"),
+        (["--seed", "-1"], "-1 is not a whole number from 0"),
+        (["--samples", "0"], "0 is not a whole number from 1"),
+        (
+            ["--json", "nowhere/result.json"],
+            "nowhere/result.json is not a file in a folder that exists",
+        ),
     ],
 )
 def test_bad_arguments_end_with_a_message(
@@ -204,8 +206,7 @@ def test_ctrl_c_ends_it_without_a_traceback(tmp_path: Path) -> None:
         [*command, "--samples", "100000"], stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
-        while "evaluate box_a" not in process.stderr.readline():
-            time.sleep(0.01)
+        assert any("evaluate box_a" in line for line in process.stderr)
         process.send_signal(signal.SIGINT)
         _, rest = process.communicate(timeout=60)
     assert process.returncode != 0

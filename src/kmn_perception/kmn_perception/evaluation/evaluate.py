@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Mapping
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from kmn_perception import weights
+from kmn_perception.command_line import output_file, whole_number
 from kmn_perception.configuration import ConfigurationError
 from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.methods import METHODS, Method, MethodError, choose
@@ -33,30 +33,13 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """Parse the command line."""
     parser = argparse.ArgumentParser(prog="evaluate", description=__doc__)
     parser.add_argument("--model", required=True, help="name or YAML file of the kinematic model")
-    parser.add_argument("--samples", type=_positive, default=2000, help="default 2000")
-    parser.add_argument("--seed", type=_natural, default=0, help="of the samples (default 0)")
+    parser.add_argument("--samples", type=whole_number(1), default=2000, help="default 2000")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of samples (default 0)")
     parser.add_argument("--noise", choices=NOISES, help="of the sensor (default: as in training)")
     parser.add_argument("--weights", help="weight file (default: the one shipped with the model)")
     parser.add_argument("--methods", nargs="+", choices=METHODS, help="default: all that apply")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="file to write the result to")
-    options = parser.parse_args(argv)
-    if options.json and not options.json.absolute().parent.is_dir():
-        parser.error(f"--json: there is no folder {options.json.parent}")
-    return options
-
-
-def _natural(text: str) -> int:
-    number = int(text)
-    if number < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative")
-    return number
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number <= 0:
-        raise argparse.ArgumentTypeError(f"{text} is not positive")
-    return number
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    return parser.parse_args(argv)
 
 
 class Tally:

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
+from kmn_perception.columns import columns
 from kmn_perception.evaluation.settings import PaperFigures
 from kmn_perception.kinematic_model import KinematicModel
 
 NONE = "-"
-
-
-def columns(rows: Sequence[Sequence[str]]) -> str:
-    """Return rows of text in columns: the first to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
-    )
 
 
 def report(model: KinematicModel, result: dict[str, Any], paper: PaperFigures) -> str:

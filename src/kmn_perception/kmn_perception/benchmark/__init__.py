@@ -1,0 +1,97 @@
+"""The ``benchmark`` executable: how fast the stages of morph_node and its transport are."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import rclpy
+import torch
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from kmn_perception.benchmark import stages, transport
+from kmn_perception.benchmark.scene import full_cloud
+from kmn_perception.columns import columns
+from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.estimator import MorphEstimator
+from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.pipeline import MorphPipeline
+
+THREADS = 1  # of torch; as morph_node sets it
+
+
+def arguments(argv: list[str]) -> argparse.Namespace:
+    """Parse the command line without its ROS arguments."""
+    parser = argparse.ArgumentParser(
+        prog="benchmark",
+        description=__doc__,
+        epilog="Parameters are those of morph_node: --ros-args -p model:=NAME ...",
+    )
+    parser.add_argument(
+        "--frames", type=whole_number(1), default=100,
+        help="times that each stage runs, and clouds through the topic (default 100)",
+    )  # fmt: skip
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    return parser.parse_args(argv)
+
+
+def benchmark(node: Node, frames: int) -> dict[str, Any]:
+    """Measure stages and transport with the parameters of morph_node, as written to JSON."""
+    declare_parameters(node)
+    settings = NodeSettings.check(read_parameters(node))
+    torch.set_num_threads(THREADS)
+    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
+    cloud = full_cloud(estimator.model)
+    chain, points = stages.chain(MorphPipeline(estimator, settings.pipeline), settings, cloud)
+    print(
+        f"{estimator.model.name}: {points} points of {cloud.width} x {cloud.height}; "
+        f"torch on {THREADS} thread"
+    )
+    return {
+        "stages": stages.measure(chain, frames),
+        "transport": transport.measure(node, settings, frames),
+    }
+
+
+def report(result: dict[str, Any]) -> str:
+    """Return the tables of a benchmark.
+
+    Parameters
+    ----------
+    result
+        As written to JSON.
+    """
+    stage_rows = [["stage", "median [ms]", "p95 [ms]"]]
+    for name, times in result["stages"].items():
+        stage_rows.append([name, f"{times['median_ms']:.2f}", f"{times['p95_ms']:.2f}"])
+    profile = Path(os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE", "none")).name
+    sent, received, median = result["transport"].values()
+    transport_rows = [
+        ["transport", "sent", "received", "median [ms]"],
+        [f"profile {profile}", str(sent), str(received), f"{median:.2f}"],
+    ]
+    return f"{columns(stage_rows)}\n\n{columns(transport_rows)}"
+
+
+def main() -> None:
+    """Run the executable."""
+    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C: just KeyboardInterrupt
+    try:
+        result = benchmark(Node("benchmark"), options.frames)
+        print(report(result))
+        if options.json:
+            options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    except KeyboardInterrupt:
+        sys.exit("benchmark: interrupted")
+    except (OSError, ParameterException, ValueError) as error:
+        sys.exit(f"benchmark: {error}")
+    finally:
+        rclpy.shutdown()

@@ -1,0 +1,41 @@
+"""The scene of the benchmark: an object on a floor in front of a wall."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.messages import cloud_from_points
+from kmn_perception.rendering import depth_to_points, render
+
+WALL_DISTANCE = 1.0  # metres behind the object
+EXTENT = 20.0  # metres; floor and wall fill the view
+THICKNESS = 0.02  # metres
+
+
+def full_cloud(model: KinematicModel) -> PointCloud2:
+    """Return the organised cloud of the prototype as the canonical camera sees it.
+
+    Every pixel is measured: what does not show the object shows the floor or the wall.
+    """
+    zero = np.zeros(len(model.parameters))
+    cubes = np.concatenate((model.unit_cubes(*model.split(zero)), _floor_and_wall(model)))
+    points = depth_to_points(render(cubes, model.camera), model.camera)
+    return cloud_from_points(points, Header(frame_id="camera_optical_frame"))
+
+
+def _floor_and_wall(model: KinematicModel) -> NDArray[np.float64]:
+    """Return two slabs as maps of the unit cube (2, 4, 4): z = 0, and upright facing the camera."""
+    floor, wall = np.eye(4), np.eye(4)
+    floor[:3, :3] = np.diag([EXTENT, EXTENT, THICKNESS])
+    floor[2, 3] = -THICKNESS / 2.0
+    up, forward = np.array([0.0, 0.0, 1.0]), model.camera.pose[:3, 2] * [1.0, 1.0, 0.0]
+    forward /= np.linalg.norm(forward)
+    wall[:3, :3] = np.column_stack(
+        (THICKNESS * forward, EXTENT * np.cross(up, forward), EXTENT * up)
+    )
+    wall[:3, 3] = WALL_DISTANCE * forward
+    return np.stack((floor, wall))

@@ -1,0 +1,85 @@
+"""Milliseconds of each stage between a cloud and its morphing parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2
+from tqdm import tqdm
+
+from kmn_perception.messages import (
+    markers_from_estimate,
+    parameters_from_estimate,
+    points_from_cloud,
+)
+from kmn_perception.morph import predict, start
+from kmn_perception.node_parameters import NodeSettings
+from kmn_perception.observation import point_cloud_to_depth
+from kmn_perception.pipeline import MorphPipeline
+
+Stage = Callable[[], object]
+
+
+def chain(
+    pipeline: MorphPipeline, settings: NodeSettings, cloud: PointCloud2
+) -> tuple[dict[str, Stage], int]:
+    """Return the stages that a cloud goes through, and the number of the object's points.
+
+    Raises
+    ------
+    ValueError
+        If no object is found in the cloud.
+    """
+    estimator = pipeline.estimator
+    model, network, steps = estimator.model, estimator.network, settings.estimator.iterations
+    # Without a tolerance all steps are made, as for an object that converges late.
+    estimator.settings = dataclasses.replace(settings.estimator, tolerance=0.0)
+
+    def message_to_array() -> NDArray[np.float32]:
+        return points_from_cloud(cloud, settings.max_range)
+
+    def callback() -> None:
+        estimate = pipeline.estimate(message_to_array())
+        parameters_from_estimate(model, estimate, cloud.header)
+        markers_from_estimate(model, estimate, cloud.header)
+
+    points = message_to_array()
+    observation = pipeline.observe(points)
+    if observation is None or not len(observation.points):
+        raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
+    seen = observation.points
+    depth = torch.from_numpy(point_cloud_to_depth(model, seen, np.eye(4))[None])
+    return {
+        "message_to_array": message_to_array,
+        "background_removal": lambda: pipeline.observe(points),
+        "splat": lambda: point_cloud_to_depth(model, seen, np.eye(4)),
+        "network": lambda: network.predict(depth),
+        f"prediction_{steps}_steps": lambda: predict(
+            model, network, [seen], start(model, [seen]), steps
+        ),
+        "callback": callback,
+    }, len(seen)
+
+
+def measure(chain: dict[str, Stage], repetitions: int) -> dict[str, dict[str, float]]:
+    """Return median and 95th percentile of each stage in milliseconds.
+
+    The stages take turns, so that a disturbance does not hit one of them alone.
+    """
+    milliseconds: dict[str, list[float]] = {name: [] for name in chain}
+    for stage in chain.values():
+        stage()  # the first time loads and compiles
+    for _ in tqdm(range(repetitions), desc="stages", unit=" rounds", mininterval=1.0):
+        for name, stage in chain.items():
+            started = time.perf_counter()
+            stage()
+            milliseconds[name].append(1e3 * (time.perf_counter() - started))
+    return {
+        name: {"median_ms": float(np.median(times)), "p95_ms": float(np.percentile(times, 95))}
+        for name, times in milliseconds.items()
+    }

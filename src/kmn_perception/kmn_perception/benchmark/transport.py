@@ -1,0 +1,92 @@
+"""Clouds through a real topic from one process to another."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time
+
+import numpy as np
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from sensor_msgs.msg import PointCloud2
+from tqdm import tqdm
+
+from kmn_perception.benchmark.scene import full_cloud
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.node_parameters import NodeSettings
+
+TOPIC = "benchmark/points"  # not `points`: nodes that run beside are left alone
+PERIOD = 0.1  # seconds
+DISCOVERY_TIMEOUT = 20.0  # seconds
+DISCOVERY_MARGIN = 0.5  # seconds for both sides to know each other
+FLUSH = 2.0  # seconds for the last clouds to arrive
+
+
+def measure(node: Node, settings: NodeSettings, frames: int) -> dict[str, float]:
+    """Receive, as morph_node does, the clouds that another process publishes at 10 Hz.
+
+    Returns
+    -------
+    transport
+        ``sent`` and ``received`` clouds, and ``median_ms`` from before `publish` to the callback.
+
+    Raises
+    ------
+    ChildProcessError
+        If the other process failed.
+    """
+    milliseconds: list[float] = []
+    with tqdm(total=frames, desc="transport", unit=" clouds", mininterval=1.0) as bar:
+
+        def receive(cloud: PointCloud2) -> None:
+            age = node.get_clock().now() - Time.from_msg(cloud.header.stamp)
+            milliseconds.append(age.nanoseconds * 1e-6)
+            bar.update()
+
+        reliability = ReliabilityPolicy[settings.reliability.upper()]
+        newest = QoSProfile(depth=1, reliability=reliability)
+        node.create_subscription(PointCloud2, TOPIC, receive, newest)
+        publisher = multiprocessing.get_context("spawn").Process(
+            target=publish, args=(settings.model, frames), daemon=True
+        )
+        # The child inherits that it ignores Ctrl-C: this process ends both.
+        on_interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        publisher.start()
+        signal.signal(signal.SIGINT, on_interrupt)
+        try:
+            while publisher.is_alive():
+                rclpy.spin_once(node, timeout_sec=PERIOD)
+        finally:
+            publisher.kill()
+            publisher.join()
+    if publisher.exitcode != 0:
+        raise ChildProcessError(f"the publishing process ended with {publisher.exitcode}")
+    return {
+        "sent": frames,
+        "received": len(milliseconds),
+        "median_ms": float(np.median(milliseconds)) if milliseconds else float("nan"),
+    }
+
+
+def publish(model: str, frames: int) -> None:
+    """Publish clouds at 10 Hz as soon as somebody listens; runs in a process of its own."""
+    cloud = full_cloud(KinematicModel.load(model))
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = Node("benchmark_publisher")
+    publisher = node.create_publisher(PointCloud2, TOPIC, QoSProfile(depth=1))
+    deadline = time.monotonic() + DISCOVERY_TIMEOUT
+    while not publisher.get_subscription_count() and time.monotonic() < deadline:
+        time.sleep(PERIOD)
+    time.sleep(DISCOVERY_MARGIN)
+    due = time.monotonic()
+    for _ in range(frames):
+        time.sleep(max(0.0, due - time.monotonic()))
+        cloud.header.stamp = node.get_clock().now().to_msg()
+        publisher.publish(cloud)
+        due += PERIOD
+    time.sleep(FLUSH)
+    rclpy.shutdown()

@@ -1,0 +1,141 @@
+"""The benchmark: its scene is what it says, and a short run of it in processes of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import domain_coordinator
+import numpy as np
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+from kmn_perception import weights
+from kmn_perception.benchmark import arguments, benchmark
+from kmn_perception.benchmark.scene import WALL_DISTANCE, full_cloud
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.messages import points_from_cloud
+from kmn_perception.network import MorphNetwork
+from kmn_perception.rendering import render
+from kmn_perception.transformation import transform_points
+
+COMMAND = [sys.executable, "-c", "from kmn_perception.benchmark import main; main()"]
+FRAMES = 5
+
+
+@pytest.fixture
+def environment() -> Iterator[dict[str, str]]:
+    """Return the environment of a process in a ROS domain of its own."""
+    with domain_coordinator.domain_id() as domain:
+        yield {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+
+
+@pytest.fixture
+def parameters(tmp_path: Path) -> list[str]:
+    """Return ROS arguments that name weights of the door with an untrained network."""
+    path, door = tmp_path / "door.safetensors", KinematicModel.load("door")
+    kmn, baseline = (MorphNetwork(door, [2, 4, 8, 16, 32]) for _ in range(2))
+    known = {**weights.describe(door), "channels": kmn.channels}
+    weights.save(path, weights.Weights(kmn, baseline, known))
+    return ["--ros-args", "-p", f"weights:={path}"]
+
+
+@pytest.mark.parametrize("name", ["door", "box"])
+def test_the_scene_shows_the_prototype_on_a_floor_before_a_wall(name: str) -> None:
+    model = KinematicModel.load(name)
+    points = points_from_cloud(full_cloud(model), max_range=100.0)
+    assert points.shape == (480, 640, 3)
+    assert np.isfinite(points).all()
+    zero = np.zeros(len(model.parameters))
+    alone = render(model.unit_cubes(*model.split(zero)), model.camera)
+    seen = ~np.isnan(alone)
+    np.testing.assert_array_equal(points[..., 2][seen], alone[seen])
+    world = transform_points(model.camera.pose, points)[~seen]
+    forward = model.camera.pose[:2, 2] / np.linalg.norm(model.camera.pose[:2, 2])
+    on_floor = np.abs(world[:, 2]) < 1e-4
+    on_wall = np.abs(world[:, :2] @ forward - WALL_DISTANCE) < 0.02
+    assert (on_floor | on_wall).all()
+    assert on_floor.any()
+
+
+def test_the_result_holds_every_stage_and_the_transport(
+    tmp_path: Path, environment: dict[str, str], parameters: list[str]
+) -> None:
+    out = tmp_path / "result.json"
+    command = [*COMMAND, "--frames", str(FRAMES), "--json", str(out), *parameters]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    result = json.loads(out.read_text())
+    assert set(result) == {"stages", "transport"}
+    assert list(result["stages"]) == [
+        "message_to_array", "background_removal", "splat", "network", "prediction_5_steps",
+        "callback",
+    ]  # fmt: skip
+    for times in result["stages"].values():
+        assert set(times) == {"median_ms", "p95_ms"}
+        assert 0.0 < times["median_ms"] <= times["p95_ms"]
+    assert set(result["transport"]) == {"sent", "received", "median_ms"}
+    assert result["transport"]["sent"] == FRAMES
+    assert 0 < result["transport"]["received"] <= FRAMES
+    assert result["transport"]["median_ms"] > 0.0
+    for row in (*result["stages"], "transport"):
+        assert f"\n{row} " in ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (["--frames", "0"], "0 is not a whole number from 1"),
+        (["--json", "nowhere/result.json"], "is not a file in a folder that exists"),
+    ],
+)
+def test_bad_arguments_end_with_a_message(
+    line: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        arguments(line)
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
+        ("model:=boat", "'boat' is neither a file nor one of the shipped"),
+        ("crop_min:=[9.0, 9.0, 9.0]", "'crop_min' must be below 'crop_max'"),
+        ("crop_max:=[-1.0, 1.5, 3.0]", "the node's parameters leave nothing of a 'door'"),
+    ],
+)
+def test_parameters_that_cannot_be_measured_are_refused(
+    parameter: str, message: str, parameters: list[str]
+) -> None:
+    context = Context()
+    with domain_coordinator.domain_id() as domain:
+        rclpy.init(context=context, domain_id=domain)
+        node = Node("benchmark", context=context, cli_args=[*parameters, "-p", parameter])
+        with pytest.raises((OSError, ValueError), match=message):
+            benchmark(node, FRAMES)
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def test_ctrl_c_ends_both_processes_without_a_traceback(
+    environment: dict[str, str], parameters: list[str]
+) -> None:
+    with subprocess.Popen(
+        [*COMMAND, "--frames", "20", *parameters],
+        env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        assert any("transport:" in line for line in process.stderr)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to both
+        _, rest = process.communicate(timeout=60)  # returns when none of them holds the pipe
+    assert process.returncode != 0
+    assert rest.endswith("benchmark: interrupted\n")
+    assert "Traceback" not in rest

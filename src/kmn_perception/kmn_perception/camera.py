@@ -82,7 +82,7 @@ class Camera:
     @property
     def world_to_camera(self) -> NDArray[np.float64]:
         """(4, 4) transformation from the world frame to the optical frame."""
-        return np.linalg.inv(self.pose)
+        return np.linalg.inv(self.pose).astype(np.float64)
 
 
 def look_at(position: ArrayLike, target: ArrayLike) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import yaml
 
@@ -78,7 +78,7 @@ class Section:
     def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
         """Return a finite number within [low, high]."""
         value = self.values.get(key)
-        if not is_number(value) or not low <= float(value) <= high:
+        if not is_number(value) or not low <= value <= high:
             raise self.error(f"'{key}' must be a number in [{low:g}, {high:g}], found {value!r}")
         return float(value)
 
@@ -104,6 +104,6 @@ class Section:
         return low, high
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[int | float]:
     """Tell whether a YAML value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

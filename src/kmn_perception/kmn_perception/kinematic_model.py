@@ -177,7 +177,8 @@ class KinematicModel:
 
     def sample(self, generator: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw (theta, gamma) (count, n + m) uniformly within the limits."""
-        return generator.uniform(*self.limits.T, size=(count, len(self.parameters)))
+        low, high = self.limits.T
+        return generator.uniform(low, high, size=(count, len(self.parameters)))
 
     def unit_cubes(self, theta: ArrayLike, gamma: ArrayLike) -> NDArray[np.float64]:
         """Return the bodies of m(theta, gamma) as maps of the unit cube to the world.

@@ -35,13 +35,15 @@ class MorphNetwork(nn.Module):
         features = channels[-1] * (model.input.width // shrunk) * (model.input.height // shrunk)
         self.linear = nn.Linear(features, self.encoding.size)
         self._initialise()
-        self.to(memory_format=torch.channels_last)  # twice as fast to train on a CPU
+        # Twice as fast to train on a CPU.
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def _initialise(self) -> None:
         """Kaiming weights and slightly positive biases: with few channels, dead ReLUs are fatal."""
         for layer in self.convolutions:
             if isinstance(layer, nn.Conv2d):
                 nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+                assert layer.bias is not None
                 nn.init.constant_(layer.bias, 0.05)
         nn.init.normal_(self.linear.weight, std=0.01)
         nn.init.zeros_(self.linear.bias)

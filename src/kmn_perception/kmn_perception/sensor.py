@@ -29,7 +29,7 @@ def add_noise(
     if noise == "none":
         return depth
     if noise == "mm":
-        return np.round(depth * np.float32(1e3)) / np.float32(1e3)
+        return (np.round(depth * 1e3) / 1e3).astype(np.float32)
     return _kinect(depth, generator)
 
 

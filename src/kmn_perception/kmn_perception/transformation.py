@@ -86,7 +86,7 @@ class Transformation:
 
     def inverse(self, theta: ArrayLike) -> NDArray[np.float64]:
         """Return T_theta^-1 (..., 4, 4), which maps the model onto the prototype."""
-        return np.linalg.inv(self.matrix(theta))
+        return np.linalg.inv(self.matrix(theta)).astype(np.float64)
 
     def read_back(self, matrix: ArrayLike) -> NDArray[np.float64]:
         """Return theta of a transformation (..., 4, 4) of this family."""

@@ -23,7 +23,7 @@ def author_scene(name: str, values: list) -> tuple[KinematicModel, np.ndarray, n
     """Return the model, our rendering and the author's grey values of a scene."""
     model = KinematicModel.load(name[:-2])
     depth = render(model.unit_cubes(*model.split(np.array(values))), model.camera)
-    return model, depth, cv2.imread(str(AUTHOR / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+    return model, depth, np.asarray(cv2.imread(str(AUTHOR / f"{name}.png"), cv2.IMREAD_UNCHANGED))
 
 
 @pytest.mark.parametrize(("name", "values"), SCENES)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-
 from kmn_perception.transformation import Transformation, transform_points
 
 PLANAR = (("translation", "x"), ("translation", "y"), ("rotation", "z"))

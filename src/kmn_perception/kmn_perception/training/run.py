@@ -43,12 +43,12 @@ class Run:
             )
         from torch.utils.tensorboard import SummaryWriter
 
-        self._curves = SummaryWriter(str(folder / "curves"))  # type: ignore[no-untyped-call]
+        self._curves = SummaryWriter(str(folder / "curves"))
         self._saved = time.monotonic()
 
     def curve(self, name: str, value: float, step: int) -> None:
         """Add a point to a TensorBoard curve."""
-        self._curves.add_scalar(name, value, step)  # type: ignore[no-untyped-call]
+        self._curves.add_scalar(name, value, step)
 
     def checkpoint_is_due(self) -> bool:
         """Tell whether the last checkpoint is old."""

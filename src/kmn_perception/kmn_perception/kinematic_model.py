@@ -71,6 +71,8 @@ class NetworkInput:
         Size in pixels.
     near, far
         Depths in metres that become 1 and (almost) 0; 0 itself is the background.
+    contrast
+        Factor by which the network stretches depths about 1/2.
     supersampling
         The cloud is splatted on a grid this many times finer, then averaged.
     max_gap
@@ -81,6 +83,7 @@ class NetworkInput:
     height: int
     near: float
     far: float
+    contrast: float
     supersampling: int
     max_gap: int
 
@@ -298,13 +301,14 @@ def _joints(
 
 
 def _input(section: Section) -> NetworkInput:
-    section.allow(("width", "height", "near", "far", "supersampling", "max_gap"))
+    section.allow(("width", "height", "near", "far", "contrast", "supersampling", "max_gap"))
     near = section.number("near", 0.0, 1e3)
     return NetworkInput(
         width=section.whole_number("width", 32, 4096),
         height=section.whole_number("height", 32, 4096),
         near=near,
         far=section.number("far", near, 1e3),
+        contrast=section.number("contrast", 1.0, 1e3),
         supersampling=section.whole_number("supersampling", 1, 8),
         max_gap=section.whole_number("max_gap", 0, 64),
     )

@@ -14,9 +14,12 @@ MODELS = {name: KinematicModel.load(name) for name in ("box_a", "box_b", "box_c"
 
 
 def test_number_of_weights_is_that_of_the_paper() -> None:
-    """Door: 3x3 convolutions with 2, 4, 8, 16, 32 channels and one linear layer on 4 x 3 pixels."""
+    """Door: 3x3 convolutions with 2, 4, 8, 16, 32 channels and one linear layer on 4 x 3 pixels.
+
+    The two channels of the depth image add nine weights for each of the first two channels.
+    """
     network = MorphNetwork(MODELS["door"], [2, 4, 8, 16, 32])
-    channels = [1, 2, 4, 8, 16, 32]
+    channels = [2, 2, 4, 8, 16, 32]
     convolutions = sum(9 * a * b + b for a, b in zip(channels[:-1], channels[1:], strict=True))
     linear = (32 * 4 * 3 + 1) * 7
     assert sum(p.numel() for p in network.parameters()) == convolutions + linear
@@ -26,11 +29,19 @@ def test_pooling_before_the_relu_gives_the_same_as_after() -> None:
     """The order of the paper: convolution, ReLU, pooling."""
     network = MorphNetwork(MODELS["box_b"], [2, 4, 6, 8, 10])
     depth = torch.rand(3, 96, 128, generator=torch.Generator().manual_seed(0))
-    features = depth.unsqueeze(1)
+    features = network.split(depth)
     for layer in network.convolutions:
         if isinstance(layer, torch.nn.Conv2d):
             features = torch.max_pool2d(torch.relu(layer(features)), 2)
     torch.testing.assert_close(network(depth), network.linear(features.flatten(1)))
+
+
+def test_the_split_holds_the_depth_image() -> None:
+    network = MorphNetwork(MODELS["door"], [2, 4, 8, 16, 32])
+    depth = torch.tensor([[[0.0, 0.004, 0.5, 1.0]]])
+    covered, stretched = network.split(depth)[0]
+    torch.testing.assert_close(covered, torch.tensor([[0.0, 1.0, 1.0, 1.0]]))
+    torch.testing.assert_close(covered / 2.0 + stretched / network.contrast, depth[0])
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -13,6 +13,7 @@ from kmn_perception import weights
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.morph import predict, start
 from kmn_perception.network import MorphNetwork
+from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
 
@@ -135,12 +136,9 @@ class MorphEstimator:
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
-        cubes = self.model.unit_cubes(
-            np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma))
-        )
-        self.estimate(
-            np.repeat(cubes[:, :3, 3], self.settings.min_points, axis=0).astype(np.float32)
-        )
+        model = self.model
+        prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
+        self.estimate(depth_to_cloud(render(prototype, model.camera), model.camera))
 
     def estimate(self, points: NDArray[np.float32]) -> Estimate:
         """Estimate the morphing parameters of an object.

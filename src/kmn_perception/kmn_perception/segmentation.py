@@ -80,7 +80,8 @@ def remove_background(
             labels = _label_image(world.reshape(points.shape), kept, step)
         else:
             labels = _label_cloud(world, kept, step)
-        kept = _in_nearest(world, labels, viewpoint, settings.cluster_min_points)
+        eye = np.ascontiguousarray(viewpoint)  # compiled once, whatever it is a part of
+        kept = _in_nearest(world, labels, eye, settings.cluster_min_points)
     return _select(world, kept)
 
 

@@ -40,13 +40,16 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "morph_node = kmn_perception.start_morph_node:main",
-            "replay = kmn_perception.replay:main",
-            "make_example_bag = kmn_perception.example_bag:main",
-            "demo_bag = kmn_perception.demo:main",
-            "train = kmn_perception.training.train:main",
-            "evaluate = kmn_perception.evaluation.evaluate:main",
-            "benchmark = kmn_perception.benchmark:main",
+            f"{name} = {PACKAGE}.executables:{name}"
+            for name in (
+                "morph_node",
+                "replay",
+                "make_example_bag",
+                "demo_bag",
+                "train",
+                "evaluate",
+                "benchmark",
+            )
         ],
     },
 )

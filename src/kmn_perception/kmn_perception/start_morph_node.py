@@ -4,25 +4,17 @@ from __future__ import annotations
 
 import sys
 
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions, install_signal_handlers
+from rclpy.utilities import try_shutdown
+
+from kmn_perception.morph_node import MorphNode
+
 
 def main() -> int:
-    """Run the executable ``morph_node``; being interrupted is its normal end."""
-    try:
-        return _run()
-    except KeyboardInterrupt:
-        return 0
-
-
-def _run() -> int:
-    # Imported here, as torch takes seconds in which Ctrl-C shall be as quiet as later on.
-    import rclpy
-    from rclpy.exceptions import ParameterException
-    from rclpy.executors import ExternalShutdownException
-    from rclpy.signals import SignalHandlerOptions, install_signal_handlers
-    from rclpy.utilities import try_shutdown
-
-    from kmn_perception.morph_node import MorphNode
-
+    """Run the executable ``morph_node``."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = MorphNode()

@@ -22,6 +22,7 @@ from kmn_perception.node_parameters import NodeSettings
 from kmn_perception.observation import point_cloud_to_depth
 from kmn_perception.pipeline import MorphPipeline
 
+STEPS = 5  # predictions, as in the paper
 Stage = Callable[[], object]
 
 
@@ -36,9 +37,9 @@ def chain(
         If no object is found in the cloud.
     """
     estimator = pipeline.estimator
-    model, network, steps = estimator.model, estimator.network, settings.estimator.iterations
+    model, network = estimator.model, estimator.network
     # Without a tolerance all steps are made, as for an object that converges late.
-    estimator.settings = dataclasses.replace(settings.estimator, tolerance=0.0)
+    estimator.settings = dataclasses.replace(settings.estimator, iterations=STEPS, tolerance=0.0)
 
     def message_to_array() -> NDArray[np.float32]:
         return points_from_cloud(cloud, settings.max_range)
@@ -59,8 +60,8 @@ def chain(
         "background_removal": lambda: pipeline.observe(points),
         "splat": lambda: point_cloud_to_depth(model, seen, np.eye(4)),
         "network": lambda: network.predict(depth),
-        f"prediction_{steps}_steps": lambda: predict(
-            model, network, [seen], start(model, [seen]), steps
+        f"prediction_{STEPS}_steps": lambda: predict(
+            model, network, [seen], start(model, [seen]), STEPS
         ),
         "callback": callback,
     }, len(seen)

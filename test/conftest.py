@@ -6,12 +6,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
 from typing import Any, TypeVar
 
 import domain_coordinator
 import pytest
-import torch
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
@@ -24,10 +22,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception import weights
-from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.morph_node import MorphNode
-from kmn_perception.network import MorphNetwork
 from kmn_perception.node_parameters import DESCRIPTORS
 
 TIMEOUT = 60.0  # seconds until a test gives up to wait
@@ -178,29 +173,10 @@ def graph(domain: int) -> Iterator[Graph]:
         yield Graph(context, stack)
 
 
-@pytest.fixture(scope="session")
-def untrained(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that makes a weight file with an untrained network for a model."""
-
-    def make(name: str) -> Path:
-        path = tmp_path_factory.mktemp("weights") / f"{name}.safetensors"
-        model, channels = KinematicModel.load(name), [2, 4, 8, 16, 32]
-        torch.manual_seed(0)
-        networks = [MorphNetwork(model, channels) for _ in range(2)]
-        metadata = {**weights.describe(model), "channels": channels}
-        weights.save(path, weights.Weights(networks[0], networks[1], metadata))
-        return path
-
-    return make
-
-
 @pytest.fixture(scope="module")
-def node(graph: Any, untrained: Callable[[str], Path]) -> MorphNode:
+def node(graph: Any) -> MorphNode:
     """Start a node whose subscriptions are reliable, so that no test waits for a lost message."""
-    overrides = [
-        Parameter("weights", value=str(untrained("door"))),
-        Parameter("reliability", value="reliable"),
-    ]
+    overrides = [Parameter("reliability", value="reliable")]
     return graph.start(MorphNode, parameter_overrides=overrides)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -136,21 +135,16 @@ def test_world_frame_takes_effect(client: Any, restored: None) -> None:
     assert client.ask(view_of_door()).header.frame_id == "map"
 
 
-def test_model_changes_with_its_weights(
-    client: Any, restored: None, untrained: Callable[[str], Path]
-) -> None:
-    assert client.set(model="box_a", weights=str(untrained("box_a"))).successful
+def test_model_changes_with_its_shipped_weights(client: Any, restored: None) -> None:
+    assert client.set(model="box_a").successful
     answer = client.ask(view_of_box(table=False))
     assert (answer.model, answer.theta_names) == ("box_a", ["x", "y"])
 
 
-def test_camera_pose_from_the_support_plane(
-    client: Any, restored: None, untrained: Callable[[str], Path]
-) -> None:
+def test_camera_pose_from_the_support_plane(client: Any, restored: None) -> None:
     """A box on a table that an unknown camera sees stands where it would without the table."""
     assert client.set(
         model="box_a",
-        weights=str(untrained("box_a")),
         camera_pose="support_plane",
         cluster_step=0.02,
         cluster_min_points=50,
@@ -191,9 +185,7 @@ def test_node_does_not_start_with_wrong_values(
         MorphNode(context=graph.context, parameter_overrides=[Parameter(name, value=value)])
 
 
-def test_node_does_not_start_with_the_weights_of_another_model(
-    graph: Any, untrained: Callable[[str], Path]
-) -> None:
-    weights = Parameter("weights", value=str(untrained("box_a")))
+def test_node_does_not_start_with_the_weights_of_another_model(graph: Any) -> None:
+    weights = Parameter("weights", value="box_a")
     with pytest.raises(WeightsError, match="was trained for another model"):
         MorphNode(context=graph.context, parameter_overrides=[weights])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +34,9 @@ def test_node_ends_quietly_when_it_is_stopped(
     graph: Any,
     domain: int,
     tmp_path: Path,
-    untrained: Callable[[str], Path],
     stop: signal.Signals,
 ) -> None:
-    process = start(domain, tmp_path, f"weights:={untrained('door')}")
+    process = start(domain, tmp_path)
     watcher = graph.start(lambda context: Node("watcher", context=context))
     reports: list[DiagnosticArray] = []
     watcher.create_subscription(DiagnosticArray, "/diagnostics", reports.append, 10)
@@ -51,10 +49,8 @@ def test_node_ends_quietly_when_it_is_stopped(
     assert (process.returncode, "Traceback" in output) == (0, False), output
 
 
-def test_node_that_is_interrupted_while_it_starts_ends_quietly(
-    domain: int, tmp_path: Path, untrained: Callable[[str], Path]
-) -> None:
-    process = start(domain, tmp_path, f"weights:={untrained('door')}")
+def test_node_that_is_interrupted_while_it_starts_ends_quietly(domain: int, tmp_path: Path) -> None:
+    process = start(domain, tmp_path)
     try:
         with pytest.raises(subprocess.TimeoutExpired):
             process.communicate(timeout=1.0)  # it imports
@@ -62,7 +58,9 @@ def test_node_that_is_interrupted_while_it_starts_ends_quietly(
         output, _ = process.communicate(timeout=TIMEOUT)
     finally:
         process.kill()
-    assert (process.returncode, "Traceback" in output) == (0, False), output
+    # 130: interrupted while it loads; 0: while it starts.
+    assert process.returncode in (0, 130), output
+    assert "Traceback" not in output
 
 
 def test_node_that_cannot_start_says_why_in_one_line(domain: int, tmp_path: Path) -> None:

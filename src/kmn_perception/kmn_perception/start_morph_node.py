@@ -14,7 +14,14 @@ from kmn_perception.morph_node import MorphNode
 
 
 def main() -> int:
-    """Run the executable ``morph_node``."""
+    """Run the executable ``morph_node``; being interrupted is its normal end."""
+    try:
+        return _run()
+    except KeyboardInterrupt:
+        return 0
+
+
+def _run() -> int:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = MorphNode()

@@ -91,7 +91,7 @@ class TrainingSettings:
         return cls(
             channels=tuple(int(channel) for channel in channels),
             samples=section.whole_number("samples", 10, 10**8),
-            augmentation=section.number("augmentation", 0.0, 1.0),
+            augmentation=section.number("augmentation", 0.0, 10.0),
             rounds=section.whole_number("rounds", 0, 100),
             epochs=section.whole_number("epochs", 1, 10**5),
             retrain_epochs=section.whole_number("retrain_epochs", 1, 10**5),

@@ -23,7 +23,7 @@ from kmn_perception.transformation import transform_points
 
 NAN, INF = float("nan"), float("inf")
 MODEL = KinematicModel.load("door")
-CAMERA = MODEL.camera.resized(160, 120)
+CAMERA = MODEL.camera.resized(320, 240)
 TRUTH = [0.1, -0.1, 0.2]  # x, y, yaw
 DEPTH = render(MODEL.unit_cubes(TRUTH, np.zeros(4)), CAMERA)
 POINTS = depth_to_points(DEPTH, CAMERA)
@@ -156,10 +156,10 @@ BAD_CLOUDS = {
     "missing_fields": (altered(fields=[]), "lacks the fields x, y, z"),
     "datatype": (wrong_datatype, "field z has datatype 5, expected 7"),
     "point_step": (altered(point_step=8), "ends at byte 12 of a point, but point_step is 8"),
-    "row_step": (altered(row_step=17), "row_step is 17, expected 1920 bytes or more"),
+    "row_step": (altered(row_step=17), "row_step is 17, expected 3840 bytes or more"),
     "truncated": (altered(data=array.array("B", bytes(999))), "has 999 bytes of data, expected"),
     "excess_data": (altered(data=array.array("B", bytes(10**6))), "has 1000000 bytes of data"),
-    "no_finite_points": (cloud_of(NAN), "none of the 19200 points was measured"),
+    "no_finite_points": (cloud_of(NAN), "none of the 76800 points was measured"),
     "huge_values": (cloud_of(1e9), "the nearest at 1e+09 m; expected metres"),
 }
 
@@ -167,12 +167,12 @@ BAD_DEPTHS = {
     "encoding": (altered(encoding="bgr8"), altered(), "encoding 'bgr8', expected '32FC1'"),
     "size_mismatch": (altered(), altered(width=640, height=480), "its camera_info 640 x 480"),
     "focal_length": (altered(), altered(k=[0.0] * 9, p=[0.0] * 12), "fx = 0, fy = 0"),
-    "row_step": (altered(step=3), altered(), "step is 3, expected 640"),
+    "row_step": (altered(step=3), altered(), "step is 3, expected 1280"),
     "truncated": (altered(data=array.array("B", bytes(9))), altered(), "9 bytes of data, expected"),
     "no_finite_points": (
         altered(data=array.array("B", bytes(len(DEPTH.tobytes())))),
         altered(),
-        "none of the 19200 points was measured",
+        "none of the 76800 points was measured",
     ),
 }
 

@@ -31,7 +31,7 @@ SECONDS = count(1)  # every frame its own stamp
 def view_of(camera: Camera, cubes: NDArray[np.float64]) -> PointCloud2:
     header = Header(frame_id="camera_optical_frame")
     header.stamp.sec = next(SECONDS)
-    camera = camera.resized(160, 120)
+    camera = camera.resized(320, 240)
     return cloud_from_points(depth_to_points(render(cubes, camera), camera), header)
 
 
@@ -73,7 +73,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "read-only": ({"reliability": "best_effort"}, "read-only"),
     "no world": ({"world_frame": ""}, "'world_frame' is empty"),
     "unknown model": ({"model": "window"}, "'window' is neither a file nor one of the shipped"),
-    "weights of another model": ({"model": "box_a"}, "was trained for another model"),
+    "weights of another model": ({"weights": "box_a"}, "was trained for another model"),
     "missing weights": ({"weights": "none.safetensors"}, "no weights: 'none.safetensors'"),
 }
 
@@ -150,7 +150,7 @@ def test_camera_pose_from_the_support_plane(client: Any, restored: None) -> None
         cluster_min_points=50,
     ).successful
     answer = client.ask(view_of_box(table=True))
-    camera = Camera.load("kinect_v1").resized(160, 120)
+    camera = Camera.load("kinect_v1").resized(320, 240)
     assert client.set(camera_pose="given", **given(camera)).successful
     expected = client.ask(view_of_box(table=False))
     assert answer.points_used == pytest.approx(expected.points_used, rel=0.05)

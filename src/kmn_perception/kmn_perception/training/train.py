@@ -7,6 +7,7 @@ import dataclasses
 import shutil
 import signal
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ def train(options: argparse.Namespace) -> None:
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
     torch.set_flush_denormal(True)  # tiny activations would slow a CPU down several times
+    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
     with Workers(options.device) as workers:
         if options.restart and workers.rank == 0 and folder.exists():
             shutil.rmtree(folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -68,7 +67,3 @@ class Run:
             return None
         checkpoint: dict[str, Any] = torch.load(file, map_location=device, weights_only=True)
         return checkpoint
-
-    def discard(self) -> None:
-        """Remove the folder."""
-        shutil.rmtree(self.folder)

@@ -18,7 +18,7 @@ from kmn_perception.training.settings import TrainingSettings
 from kmn_perception.training.train import arguments, settings_of
 
 COMMAND = [sys.executable, "-m", "kmn_perception.training.train", "--model", "box_a"]
-SMALL = ["--samples", "300", "--epochs", "4", "--retrain-epochs", "1", "--rounds", "1"]
+SMALL = ["--samples", "300", "--epochs", "10", "--retrain-epochs", "1", "--rounds", "1"]
 
 
 def run(out: Path, *more: str) -> subprocess.CompletedProcess:
@@ -52,7 +52,9 @@ def test_an_interrupted_run_resumes_to_the_same_weights(tmp_path: Path) -> None:
     assert process.returncode != 0
     assert "resumes from the last checkpoint" in rest
     assert "Traceback" not in rest
-    assert run(resumed).returncode == 0
+    again = run(resumed)
+    assert again.returncode == 0
+    assert "resuming in round 0" in again.stdout + again.stderr
     for name, tensor in load_file(str(whole)).items():
         np.testing.assert_array_equal(tensor.numpy(), load_file(str(resumed))[name].numpy())
 

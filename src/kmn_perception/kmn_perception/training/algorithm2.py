@@ -183,6 +183,8 @@ class Algorithm2:
     def _save_now_and_then(self) -> None:
         if self.run.checkpoint_is_due():
             self._save()
+        if self.run.interrupted:
+            raise KeyboardInterrupt
 
     def _save(self) -> None:
         if self.workers.rank == 0:

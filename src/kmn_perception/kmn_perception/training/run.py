@@ -44,14 +44,21 @@ class Run:
 
         self._curves = SummaryWriter(str(folder / "curves"))
         self._saved = time.monotonic()
+        self.interrupted = False
+
+    def interrupt(self, signum: int, frame: object) -> None:
+        """Handle a signal: stop at the next checkpoint, which is due at once; again, stop now."""
+        if self.interrupted:
+            raise KeyboardInterrupt
+        self.interrupted = True
 
     def curve(self, name: str, value: float, step: int) -> None:
         """Add a point to a TensorBoard curve."""
         self._curves.add_scalar(name, value, step)
 
     def checkpoint_is_due(self) -> bool:
-        """Tell whether the last checkpoint is old."""
-        return time.monotonic() - self._saved > CHECKPOINT_SECONDS
+        """Tell whether the last checkpoint is old, or the run shall stop."""
+        return self.interrupted or time.monotonic() - self._saved > CHECKPOINT_SECONDS
 
     def save(self, checkpoint: dict[str, Any]) -> None:
         """Replace the checkpoint in one go, so that an interrupt never leaves half a file."""

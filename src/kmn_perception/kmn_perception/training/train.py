@@ -64,6 +64,8 @@ def train(options: argparse.Namespace) -> None:
             "training": dataclasses.asdict(settings),
         }
         run = Run(folder, {**known, "processes": workers.count})
+        for interruption in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(interruption, run.interrupt)
         algorithm = Algorithm2(model, settings, run, workers)
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
@@ -88,7 +90,6 @@ def _result(algorithm: Algorithm2, known: dict[str, Any]) -> weights.Weights:
 def main() -> None:
     """Run the executable; an interrupted run is resumed by the same command."""
     options = arguments()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         train(options)
     except KeyboardInterrupt:

@@ -1,14 +1,37 @@
-"""From a point cloud to the network's depth image (the paper's ``pointCloudToDepth``)."""
+"""What a sensor saw, and the network's depth image of it (the paper's ``pointCloudToDepth``)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.camera import Camera
 from kmn_perception.kinematic_model import KinematicModel
 
 FARTHEST = 1.0 / 256.0  # what is farther than ``far`` still differs from the background
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """An object's points, and from where they were seen.
+
+    Attributes
+    ----------
+    points
+        (N, 3) world frame, metres, finite.
+    camera
+        The sensor: its intrinsics, the size of its image and its pose in the world. What lies
+        outside its image was not seen, what lies inside without a point was seen to be empty.
+    floor
+        Height (metres, world z) up to which points were lost with the support plane.
+    """
+
+    points: NDArray[np.float32]
+    camera: Camera
+    floor: float = -np.inf
 
 
 def point_cloud_to_depth(

@@ -86,7 +86,8 @@ def test_augmented_samples_hold_what_is_left_to_predict() -> None:
     """Algorithm 2: a morphed sample, morphed by its label, is at the prototype."""
     model = KinematicModel.load("box_b")
     network = weights.load("box_b", model).kmn
-    cloud, truth = sample(model, 123, 0)
+    observation, truth = sample(model, 123, 0)
+    cloud = observation.points
     prediction, _ = predict(model, network, [cloud], start(model, [cloud]), steps=1)
     left = model.transformation.remainder(prediction.values[0], truth)
     together = model.transformation.matrix(prediction.values[0]) @ model.transformation.matrix(left)
@@ -95,9 +96,9 @@ def test_augmented_samples_hold_what_is_left_to_predict() -> None:
 
 def test_samples_are_the_same_for_the_same_seed_only() -> None:
     model = KinematicModel.load("door")
-    cloud, values = sample(model, 5, 17)
+    observation, values = sample(model, 5, 17)
     again, same = sample(model, 5, 17)
-    np.testing.assert_array_equal(cloud, again)
+    np.testing.assert_array_equal(observation.points, again.points)
     np.testing.assert_array_equal(values, same)
     assert not np.array_equal(values, sample(model, 6, 17)[1])
     assert not np.array_equal(values, sample(model, 5, 18)[1])

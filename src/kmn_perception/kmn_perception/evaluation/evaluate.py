@@ -101,9 +101,9 @@ def evaluate(
         range(options.samples), desc=f"evaluate {model.name}", unit=" samples", mininterval=1.0
     )
     for index in bar:
-        cloud, truth = sample(model, options.seed, index, sensor, noise, EVALUATION)
+        observation, truth = sample(model, options.seed, index, sensor, noise, EVALUATION)
         for tally in tallies.values():
-            tally.add(cloud, truth)
+            tally.add(observation.points, truth)
     return {
         "model": model.name,
         "samples": options.samples,

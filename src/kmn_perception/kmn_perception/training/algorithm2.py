@@ -98,7 +98,8 @@ class Algorithm2:
     ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
         """Return the depth image after ``steps`` predictions, and what is left to predict."""
         number = index * self.workers.count + self.workers.rank
-        cloud, truth = sample(self.model, self.settings.seed, number, self.settings.sensor)
+        observation, truth = sample(self.model, self.settings.seed, number, self.settings.sensor)
+        cloud = observation.points
         theta = start(self.model, [cloud])
         depth = render_anew(self.model, [cloud], theta)
         if steps:
@@ -154,7 +155,8 @@ class Algorithm2:
             sample(self.model, self.settings.seed, self.settings.samples + i, self.settings.sensor)
             for i in range(VALIDATION_SAMPLES)
         ]
-        clouds, truth = [cloud for cloud, _ in pairs], np.stack([values for _, values in pairs])
+        clouds = [observation.points for observation, _ in pairs]
+        truth = np.stack([values for _, values in pairs])
         errors = errors_by_step(self.model, network, clouds, truth, VALIDATION_STEPS)
         self.state.errors.append(errors.sum(axis=2).mean(axis=1).tolist())
         by_step = " ".join(f"{error:.4f}" for error in self.state.errors[-1])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera, look_at
 from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.sensor import add_noise
 from kmn_perception.training.settings import SensorSettings
@@ -25,7 +26,7 @@ def sample(
     sensor: SensorSettings | None = None,
     noise: str = "none",
     spawn_key: tuple[int, ...] = (),
-) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+) -> tuple[Observation, NDArray[np.float64]]:
     """Return sample ``index`` of the endless sequence that a seed stands for.
 
     Parameters
@@ -37,18 +38,18 @@ def sample(
 
     Returns
     -------
-    cloud, values
-        (N, 3) observed points in the world frame, metres, and (n + m,) true (theta, gamma).
+    observation, values
+        What the sensor sees, and (n + m,) the true (theta, gamma).
     """
     generator = np.random.default_rng(np.random.SeedSequence((seed, index), spawn_key=spawn_key))
     while True:
         values = model.sample(generator, 1)[0]
         if sensor is None:
-            cloud = observe(model, values, model.camera, noise, generator)
+            observation = observe(model, values, model.camera, noise, generator)
         else:
-            cloud = _observe_from_around(model, values, sensor, generator)
-        if len(cloud) >= LEAST_POINTS:
-            return cloud, values
+            observation = _observe_from_around(model, values, sensor, generator)
+        if len(observation.points) >= LEAST_POINTS:
+            return observation, values
 
 
 def observe(
@@ -57,10 +58,10 @@ def observe(
     camera: Camera,
     noise: str,
     generator: np.random.Generator,
-) -> NDArray[np.float32]:
-    """Return the points (N, 3) of m(theta, gamma) that a camera sees, in the world frame."""
+) -> Observation:
+    """Return what a camera sees of m(theta, gamma)."""
     depth = render(model.unit_cubes(*model.split(values)), camera)
-    return depth_to_cloud(add_noise(depth, noise, generator), camera)
+    return Observation(depth_to_cloud(add_noise(depth, noise, generator), camera), camera)
 
 
 def _observe_from_around(
@@ -68,16 +69,17 @@ def _observe_from_around(
     values: NDArray[np.float64],
     sensor: SensorSettings,
     generator: np.random.Generator,
-) -> NDArray[np.float32]:
+) -> Observation:
     cubes = model.unit_cubes(*model.split(values))
     camera = _place(_camera(sensor.camera), cubes[:, :3, 3].mean(axis=0), model, sensor, generator)
-    cloud = observe(model, values, camera, sensor.noise, generator)
-    cloud = cloud[cloud[:, 2] > generator.uniform(0.0, sensor.cut_height)]
+    cloud = observe(model, values, camera, sensor.noise, generator).points
+    floor = generator.uniform(0.0, sensor.cut_height)
+    cloud = cloud[cloud[:, 2] > floor]
     if len(cloud) and generator.uniform() < sensor.occlusion:
         direction = generator.standard_normal(3)
         along = cloud @ direction.astype(np.float32)
         cloud = cloud[along >= np.quantile(along, generator.uniform(0.0, 0.4))]
-    return cloud
+    return Observation(cloud, camera, floor)
 
 
 @cache

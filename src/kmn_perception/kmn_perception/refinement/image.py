@@ -1,0 +1,79 @@
+"""The observation as an image of inverse depth, in the sensor's own pixels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from kmn_perception.observation import Observation
+from kmn_perception.refinement.geometry import projection
+
+HALF = 0.5
+
+
+class Image(NamedTuple):
+    """What the sensor saw, in its own pixels.
+
+    Attributes
+    ----------
+    inverse_depth
+        (height, width) 1 / m; 0 where nothing was seen.
+    pixels
+        (N, 3) u, v and inverse depth of all that was seen.
+    projection
+        (3, 4) map from the world to homogeneous pixels z (u, v, 1).
+    upwards
+        (4,) such that a point of depth z has the world height ``z * upwards[:3] . (u, v, 1) +
+        upwards[3]``.
+    floor
+        Height in metres up to which points were lost.
+    """
+
+    inverse_depth: NDArray[np.float32]
+    pixels: NDArray[np.float32]
+    projection: NDArray[np.float64]
+    upwards: NDArray[np.float64]
+    floor: float
+
+
+def image_of(observation: Observation) -> Image:
+    """Put the points back into the pixels from which they came."""
+    camera = observation.camera
+    matrix = projection(camera)
+    inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
+    to_world = np.linalg.inv(matrix[:, :3])
+    upwards = np.append(to_world[2], camera.pose[2, 3])
+    return Image(inverse_depth, pixels, matrix, upwards, float(observation.floor))
+
+
+@njit(cache=True)
+def _splat(
+    inverse_depth: NDArray[np.float32],
+    points: NDArray[np.float32],
+    matrix: NDArray[np.float64],
+    near: float,
+) -> NDArray[np.float32]:
+    """Keep the nearest point of each pixel; return the pixels that were hit, in the points' order."""
+    height, width = inverse_depth.shape
+    pixels = np.empty((points.shape[0], 3), dtype=np.float32)
+    count = 0
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
+        if not depth > near:
+            continue
+        scale = 1.0 / depth
+        u = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * scale + HALF
+        v = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * scale + HALF
+        if not (0.0 <= u < width and 0.0 <= v < height):
+            continue
+        column, row = int(u), int(v)
+        if inverse_depth[row, column] < scale:
+            inverse_depth[row, column] = scale
+            pixels[count, 0], pixels[count, 1], pixels[count, 2] = column, row, scale
+            count += 1
+    return pixels[:count]

@@ -1,0 +1,155 @@
+"""The best fit of a kinematic model to an observation, from the network's estimate or without it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.observation import Observation
+from kmn_perception.refinement.covariance import with_covariance
+from kmn_perception.refinement.gauss_newton import Fit, Problem, fit
+from kmn_perception.refinement.geometry import shape_of
+from kmn_perception.refinement.image import image_of
+from kmn_perception.refinement.settings import RefinementSettings
+
+SCAN = 9  # values of each parameter that are tried, within its limits
+YAWS = 9
+
+
+class Refinement(NamedTuple):
+    """A fit of the model to an observation.
+
+    Attributes
+    ----------
+    values, covariance
+        (n + m,) and (n + m, n + m) of (theta, gamma).
+    misfit
+        Share of the observed pixels that the model explains wrongly.
+    iterations
+        Steps that were taken.
+    improved
+        The misfit is not larger than that of the start; else the start is returned.
+    reason
+        Why the result is not to be trusted; empty when it is fine.
+    """
+
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    misfit: float
+    iterations: int
+    improved: bool
+    reason: str
+
+
+def refine(
+    model: KinematicModel,
+    observation: Observation,
+    values: NDArray[np.float64],
+    settings: RefinementSettings,
+) -> Refinement:
+    """Fit (theta, gamma) to an observation, starting from ``values`` (n + m,).
+
+    The result is never worse than the start by the common misfit.
+    """
+    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    values = np.asarray(values, dtype=np.float64)
+    count = len(problem.image.pixels)
+    if count < settings.min_points:
+        reason = f"{count} points in the image, at least {settings.min_points} are needed"
+        return _unrefined(model, values, np.nan, 0, reason)
+    if not np.isfinite(values).all():
+        return _unrefined(model, values, np.nan, 0, "the start is not finite")
+    return _refined(model, problem, values, [values])
+
+
+def refine_from_scratch(
+    model: KinematicModel, observation: Observation, settings: RefinementSettings
+) -> Refinement:
+    """Fit (theta, gamma) to an observation without any estimate: from several starts."""
+    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    start = _above_centroid(model, observation)
+    count = len(problem.image.pixels)
+    if count < settings.min_points:
+        reason = f"{count} points in the image, at least {settings.min_points} are needed"
+        return _unrefined(model, start, np.nan, 0, reason)
+    starts = _turned(model, start)
+    starts.sort(key=problem.misfit)
+    return _refined(model, problem, starts[0], starts[: settings.starts])
+
+
+def _refined(
+    model: KinematicModel,
+    problem: Problem,
+    start: NDArray[np.float64],
+    starts: list[NDArray[np.float64]],
+) -> Refinement:
+    """Fit from all starts, and from what a scan finds where they fail; keep the best."""
+    settings = problem.settings.misfit
+    fits = [_fit_with_misfit(problem, values) for values in starts]
+    iterations = sum(candidate.steps for candidate, _ in fits)
+    best, misfit = min(fits, key=lambda pair: pair[1])
+    if misfit > settings.bad:
+        for values in (best.values, start):
+            candidate, candidate_misfit = _fit_with_misfit(problem, _scan(problem, values))
+            iterations += candidate.steps
+            if candidate_misfit < misfit:
+                best, misfit = candidate, candidate_misfit
+    values, covariance = with_covariance(problem, best)
+    misfit, before = problem.misfit(values), problem.misfit(start)
+    if not misfit <= before:
+        reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
+        return _unrefined(model, start, before, iterations, reason)
+    reason = ""
+    if misfit > settings.wrong:
+        reason = f"the model explains {misfit:.0%} of the observation wrongly"
+    return Refinement(values, covariance, misfit, iterations, True, reason)
+
+
+def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit, float]:
+    candidate = fit(problem, values)
+    return candidate, problem.misfit(candidate.values)
+
+
+def _unrefined(
+    model: KinematicModel, values: NDArray[np.float64], misfit: float, iterations: int, reason: str
+) -> Refinement:
+    """Return the start; where it lies within the limits is not known."""
+    covariance = np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
+    return Refinement(values, covariance, misfit, iterations, False, reason)
+
+
+def _scan(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Improve the parameters one after another, each by trying values all over its range."""
+    best, least = values, problem.misfit(values)
+    for i, (low, high) in enumerate(problem.limits):
+        for value in np.linspace(low, high, SCAN):
+            candidate = best.copy()
+            candidate[i] = value
+            misfit = problem.misfit(candidate)
+            if misfit < least:
+                best, least = candidate, misfit
+    return best
+
+
+def _above_centroid(model: KinematicModel, observation: Observation) -> NDArray[np.float64]:
+    """Return the prototype, moved horizontally to the points."""
+    values = np.zeros(len(model.parameters))
+    if len(observation.points):
+        centroid = observation.points.mean(axis=0)
+        for axis, name in enumerate("xy"):
+            if ("translation", name) in model.transformation.kinds:
+                values[model.transformation.kinds.index(("translation", name))] = centroid[axis]
+    return np.clip(values, *model.limits.T)
+
+
+def _turned(model: KinematicModel, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the values with yaws all over their range."""
+    if ("rotation", "z") not in model.transformation.kinds:
+        return [values]
+    yaw = model.transformation.kinds.index(("rotation", "z"))
+    starts = np.repeat(values[None], YAWS, axis=0)
+    starts[:, yaw] = np.linspace(*model.limits[yaw], YAWS)
+    return list(starts)

@@ -1,0 +1,180 @@
+"""Settings of the refinement, read from ``config/refinement.yaml``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from kmn_perception import resources
+from kmn_perception.configuration import Section
+from kmn_perception.refinement.edges import LARGEST_WINDOW, EdgeSettings
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """A level of the coarse search: window in pixels, robust depth in metres, number of steps."""
+
+    window: float
+    depth: float
+    steps: int
+
+
+@dataclass(frozen=True)
+class FineSettings:
+    """The fit to the noise of the sensor.
+
+    Attributes
+    ----------
+    steps
+        Largest number of steps.
+    noise, least_noise
+        Lateral noise at the start and at least, pixels.
+    window, least_window
+        Pixels that count beside an edge, in units of the lateral noise, and at least.
+    least_depth_noise
+        Metres.
+    robust
+        Depths beyond this lose their weight, in units of their noise.
+    tolerance
+        A smaller step is the last, pixels.
+    """
+
+    steps: int
+    noise: float
+    least_noise: float
+    window: float
+    least_window: float
+    least_depth_noise: float
+    robust: float
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class MisfitSettings:
+    """The common measure of a fit.
+
+    Attributes
+    ----------
+    pixels
+        About this many of the observed pixels are looked at.
+    depth
+        A difference in depth (metres) that counts as much as a pixel on the wrong side.
+    bad, wrong
+        Above these shares other starts are tried, and the result is not to be trusted.
+    """
+
+    pixels: int
+    depth: float
+    bad: float
+    wrong: float
+
+
+@dataclass(frozen=True)
+class RefinementSettings:
+    """All numbers of the refinement.
+
+    Attributes
+    ----------
+    min_points
+        Fewer points are not refined.
+    depth_pixels
+        Number of observed pixels whose depth is compared in one step.
+    search, fine, edges, misfit
+        Of the parts.
+    starts
+        From so many starts the model is fitted where there is no estimate.
+    damping
+        Information that every squared pixel of movement is taken to cost.
+    limit_softness
+        Standard deviation beyond the limits, as a share of half the range.
+    weak
+        A direction is open when its standard deviation exceeds this share of half the range.
+    segment_rise
+        It ends where the negative log-likelihood has risen by this.
+    """
+
+    min_points: int
+    depth_pixels: int
+    search: tuple[SearchSettings, ...]
+    fine: FineSettings
+    edges: EdgeSettings
+    starts: int
+    damping: float
+    limit_softness: float
+    misfit: MisfitSettings
+    weak: float
+    segment_rise: float
+
+    @classmethod
+    def load(cls, path: Path | None = None) -> RefinementSettings:
+        """Read the shipped or the user's own file; raise ``ConfigurationError`` if it is wrong."""
+        file = path or resources.share_directory() / "config/refinement.yaml"
+        section = Section.load(file)
+        section.allow(
+            (
+                "min_points", "depth_pixels", "search", "fine", "edges", "starts", "damping",
+                "limit_softness", "misfit", "weak", "segment_rise",
+            )
+        )  # fmt: skip
+        return cls(
+            min_points=section.whole_number("min_points", 1, 10**6),
+            depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
+            search=tuple(_search(entry) for entry in section.sections("search")),
+            fine=_fine(section.section("fine")),
+            edges=_edges(section.section("edges")),
+            starts=section.whole_number("starts", 1, 100),
+            damping=section.number("damping", 0.0, 1e6),
+            limit_softness=section.number("limit_softness", 1e-6, 1.0),
+            misfit=_misfit(section.section("misfit")),
+            weak=section.number("weak", 0.0, 1.0),
+            segment_rise=section.number("segment_rise", 0.0, 1e3),
+        )
+
+
+def _search(section: Section) -> SearchSettings:
+    section.allow(("window", "depth", "steps"))
+    return SearchSettings(
+        section.number("window", 1.0, LARGEST_WINDOW),
+        section.number("depth", 1e-6, 1e3),
+        section.whole_number("steps", 0, 100),
+    )
+
+
+def _fine(section: Section) -> FineSettings:
+    section.allow(
+        (
+            "steps", "noise", "least_noise", "window", "least_window", "least_depth_noise",
+            "robust", "tolerance",
+        )
+    )  # fmt: skip
+    return FineSettings(
+        steps=section.whole_number("steps", 1, 1000),
+        noise=section.number("noise", 1e-6, LARGEST_WINDOW / 4),
+        least_noise=section.number("least_noise", 1e-6, 1.0),
+        window=section.number("window", 1.0, 10.0),
+        least_window=section.number("least_window", 1.0, LARGEST_WINDOW),
+        least_depth_noise=section.number("least_depth_noise", 1e-9, 1.0),
+        robust=section.number("robust", 1.0, 100.0),
+        tolerance=section.number("tolerance", 0.0, 1.0),
+    )
+
+
+def _edges(section: Section) -> EdgeSettings:
+    section.allow(("occluder", "background", "contrast", "floor_margin", "outliers"))
+    return EdgeSettings(
+        occluder=section.number("occluder", 0.0, 10.0),
+        background=section.number("background", 0.0, 100.0),
+        contrast=section.number("contrast", 0.0, 10.0),
+        floor_margin=section.number("floor_margin", 0.0, 10.0),
+        outliers=section.number("outliers", 1e-12, 0.49),
+    )
+
+
+def _misfit(section: Section) -> MisfitSettings:
+    section.allow(("pixels", "depth", "bad", "wrong"))
+    return MisfitSettings(
+        section.whole_number("pixels", 100, 10**8),
+        section.number("depth", 1e-6, 10.0),
+        section.number("bad", 0.0, 10.0),
+        section.number("wrong", 0.0, 10.0),
+    )

@@ -96,6 +96,25 @@ class Section:
             raise self.error(f"'{key}' must be {length} numbers, found {value!r}")
         return [float(number) for number in value]
 
+    def whole_numbers(self, key: str, low: int, high: int) -> list[int]:
+        """Return a list of at least one whole number within [low, high]."""
+        value = self.values.get(key)
+        if (
+            not isinstance(value, list | tuple)
+            or not value
+            or not all(isinstance(number, int) and low <= number <= high for number in value)
+        ):
+            raise self.error(f"'{key}' must be whole numbers in [{low}, {high}], found {value!r}")
+        return list(value)
+
+    def table(self, key: str, columns: int) -> list[list[float]]:
+        """Return a list of at least one row, each of so many finite numbers."""
+        value = self.values.get(key)
+        if not isinstance(value, list | tuple) or not value:
+            raise self.error(f"'{key}' must be rows of {columns} numbers, found {value!r}")
+        rows = Section({str(i): row for i, row in enumerate(value)}, f"{self.place}: {key}")
+        return [rows.numbers(row, columns) for row in rows.values]
+
     def limits(self, key: str) -> tuple[float, float]:
         """Return an interval; its lower end must lie below its upper end."""
         low, high = self.numbers(key, 2)

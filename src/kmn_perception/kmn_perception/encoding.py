@@ -18,9 +18,14 @@ class ParameterEncoding(nn.Module):
     the plain squared error, to which a handle's few centimetres are nothing, and equal weight,
     with which parameters that are hard to see drown the others in noise.
 
-    A model with the symmetry ``quarter_turn`` looks the same when it is turned by 90 degrees and
+    With the symmetry ``quarter_turn`` the model looks the same when it is turned by 90 degrees and
     its scales along x and y change places. Yaw and these two are then encoded by five numbers that
     do not change with that and have no jump at +-45 degrees.
+
+    Parameters
+    ----------
+    symmetry
+        The model's, or ``none`` where it is known which of the equal turns is meant.
 
     Attributes
     ----------
@@ -30,7 +35,7 @@ class ParameterEncoding(nn.Module):
 
     half_width: Tensor
 
-    def __init__(self, model: KinematicModel) -> None:
+    def __init__(self, model: KinematicModel, symmetry: str) -> None:
         super().__init__()
         kinds = model.transformation.kinds
         self.scales = [i for i, (kind, _) in enumerate(kinds) if kind == "scale"]
@@ -38,7 +43,7 @@ class ParameterEncoding(nn.Module):
         limits[self.scales] = torch.log1p(limits[self.scales])
         self.register_buffer("half_width", (limits[:, 1] - limits[:, 0]) / 2.0, persistent=False)
         self.turned: list[int] = []
-        if model.symmetry == "quarter_turn":
+        if symmetry == "quarter_turn":
             turned = (("rotation", "z"), ("scale", "x"), ("scale", "y"))
             self.turned = [kinds.index(kind) for kind in turned]
         self.plain = [i for i in range(len(limits)) if i not in self.turned]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from kmn_perception import weights
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predict, start
+from kmn_perception.morph import predict
 from kmn_perception.network import MorphNetwork
+from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
@@ -132,35 +133,25 @@ class MorphEstimator:
         """
         kinematic_model = KinematicModel.load(model)
         file = weights_file or kinematic_model.name
-        return cls(kinematic_model, weights.load(file, kinematic_model).kmn, settings)
+        return cls(kinematic_model, weights.load(file, kinematic_model).network, settings)
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
         model = self.model
         prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
-        self.estimate(depth_to_cloud(render(prototype, model.camera), model.camera))
+        points = depth_to_cloud(render(prototype, model.camera), model.camera)
+        self.estimate(Observation(points, model.camera))
 
-    def estimate(self, points: NDArray[np.float32]) -> Estimate:
-        """Estimate the morphing parameters of an object.
-
-        Parameters
-        ----------
-        points
-            (N, 3) points of the object alone, world frame, metres, finite.
-        """
-        model, settings = self.model, self.settings
+    def estimate(self, observation: Observation) -> Estimate:
+        """Estimate the morphing parameters of an object, of which alone the points are."""
+        model, settings, points = self.model, self.settings, observation.points
         if len(points) == 0:
             return Estimate.none(model, 0, Status.NO_OBJECT, "no points of an object")
         if len(points) < settings.min_points:
             reason = f"{len(points)} points, at least {settings.min_points} are needed"
             return Estimate.none(model, len(points), Status.TOO_FEW_POINTS, reason)
         prediction, iterations = predict(
-            model,
-            self.network,
-            [points],
-            start(model, [points]),
-            settings.iterations,
-            settings.tolerance,
+            self.network, [observation], settings.iterations, settings.tolerance
         )
         theta, gamma = model.split(prediction.values[0])
         residual = float(np.median(surface_distances(model.unit_cubes(theta, gamma), points)))

@@ -56,17 +56,31 @@ def point_cloud_to_depth(
     """
     image, fine = model.input, model.input.supersampling
     camera = model.camera.resized(image.width * fine, image.height * fine)
+    buffer = splat(camera, points, transform, image.max_gap)
+    return _normalise(buffer, fine, image.near, image.far)
+
+
+def splat(
+    camera: Camera, points: NDArray[np.float32], transform: NDArray[np.float64], max_gap: int
+) -> NDArray[np.float32]:
+    """Return the nearest depth in each pixel (height, width), metres; infinite where there is none.
+
+    Parameters
+    ----------
+    points, transform
+        (N, 3) world frame, metres, and the transformation (4, 4) to apply to them first.
+    max_gap
+        Holes of up to this many pixels are closed.
+    """
     matrix = (camera.world_to_camera @ transform)[:3].astype(np.float32)
     matrix[0] = matrix[0] * camera.fx + matrix[2] * camera.cx
     matrix[1] = matrix[1] * camera.fy + matrix[2] * camera.cy
     buffer = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
     v0, v1, u0, u1 = _splat(buffer, points, matrix, camera.near)
-    if v0 > v1:
-        return np.zeros((image.height, image.width), dtype=np.float32)
     filled = buffer[v0 : v1 + 1, u0 : u1 + 1]
-    _close_gaps(filled, image.max_gap)
-    _close_gaps(filled.T, image.max_gap)
-    return _normalise(buffer, fine, image.near, image.far)
+    _close_gaps(filled, max_gap)
+    _close_gaps(filled.T, max_gap)
+    return buffer
 
 
 @njit(cache=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.intrinsics import camera_of_points
+from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, remove_background
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
@@ -43,13 +44,6 @@ class PipelineSettings:
     given_pose: NDArray[np.float64]
     plane: SupportPlaneSettings
     background: SegmentationSettings
-
-
-class Observation(NamedTuple):
-    """An object's points (N, 3) in the world frame, and the camera's pose (4, 4) there; metres."""
-
-    points: NDArray[np.float32]
-    camera_pose: NDArray[np.float64]
 
 
 class MorphPipeline:
@@ -93,17 +87,27 @@ class MorphPipeline:
                 f"holds {100 * plane.min_fraction:.0f} % of the points"
             )
             return Estimate.none(self.estimator.model, 0, Status.NO_OBJECT, reason)
-        return self.estimator.estimate(observation.points)
+        return self.estimator.estimate(observation)
 
     def observe(self, points: NDArray[np.float32], in_world: bool = False) -> Observation | None:
-        """Return the object's points in the world; None if the camera's pose cannot be found."""
+        """Return what is seen of the object; None if the camera's pose cannot be found.
+
+        The intrinsics are those that an organised cloud shows. Without rows and columns, or in the
+        world frame, they are taken to be those of the canonical camera.
+        """
         pose = self._find_camera_pose(points, in_world)
         if pose is None:
             return None
-        points_to_world = np.eye(4) if in_world else pose
+        camera = None
+        if points.ndim == 3 and not in_world:
+            camera = camera_of_points(points, pose)
         background = self.settings.background
         return Observation(
-            remove_background(points, points_to_world, pose[:3, 3], background), pose
+            points=remove_background(
+                points, np.eye(4) if in_world else pose, pose[:3, 3], background
+            ),
+            camera=camera or replace(self.estimator.model.camera, pose=pose),
+            floor=background.plane_margin if background.remove_plane else -np.inf,
         )
 
     def _find_camera_pose(

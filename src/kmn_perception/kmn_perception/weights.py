@@ -14,10 +14,13 @@ from safetensors.torch import save_file
 from torch import nn
 
 from kmn_perception import resources
+from kmn_perception.cascade import Cascade, CascadeSettings
+from kmn_perception.configuration import ConfigurationError, Section
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.network import MorphNetwork
+from kmn_perception.paper_network import PaperNetwork
 
-FORMAT = "kmn-weights-1"
+FORMAT = "kmn-weights-2"
 
 
 class WeightsError(ValueError):
@@ -30,29 +33,31 @@ class Weights:
 
     Attributes
     ----------
-    kmn
-        The network after Algorithm 2.
+    network
+        The trained network.
     baseline
-        The network before its data were augmented.
+        The paper's network before its data were augmented; ``None`` for our design.
     metadata
-        ``model``, ``parameters``, ``camera``, ``channels``, ``training`` (settings, seed),
-        ``errors`` (measured after training) and ``format``.
+        ``model``, ``parameters``, ``limits``, ``bodies``, ``camera``, ``design`` of the network,
+        ``training`` (settings, seed), ``errors`` (measured after training) and ``format``.
     """
 
-    kmn: MorphNetwork
-    baseline: MorphNetwork
+    network: MorphNetwork
+    baseline: MorphNetwork | None
     metadata: dict[str, Any]
 
 
 def save(path: str | Path, weights: Weights) -> None:
     """Write a weight file."""
+    networks = {"network": weights.network, "baseline": weights.baseline}
     tensors = {
         f"{role}.{name}": tensor.contiguous()
-        for role, network in (("kmn", weights.kmn), ("baseline", weights.baseline))
+        for role, network in networks.items()
+        if network is not None
         for name, tensor in network.state_dict().items()
     }
-    metadata = {key: json.dumps(value) for key, value in weights.metadata.items()}
-    save_file(tensors, str(path), {**metadata, "format": json.dumps(FORMAT)})
+    known = {**weights.metadata, "design": weights.network.describe(), "format": FORMAT}
+    save_file(tensors, str(path), {key: json.dumps(value) for key, value in known.items()})
 
 
 def load(name_or_path: str | Path, model: KinematicModel) -> Weights:
@@ -74,26 +79,39 @@ def load(name_or_path: str | Path, model: KinematicModel) -> Weights:
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(f"{path.name} is not a readable safetensors file: {error}") from error
     _check(path.name, metadata, model)
-    networks = {role: MorphNetwork(model, metadata["channels"]) for role in ("kmn", "baseline")}
-    for role, network in networks.items():
-        state = {key.removeprefix(f"{role}."): value for key, value in tensors.items()
-                 if key.startswith(f"{role}.")}  # fmt: skip
-        _fill(path.name, network, state)
-    return Weights(networks["kmn"], networks["baseline"], metadata)
+
+    def network(role: str) -> MorphNetwork:
+        built = _build(path.name, model, metadata["design"])
+        start = f"{role}."
+        _fill(path.name, built, {
+            key.removeprefix(start): tensor
+            for key, tensor in tensors.items() if key.startswith(start)
+        })  # fmt: skip
+        return built
+
+    has_baseline = any(key.startswith("baseline.") for key in tensors)
+    return Weights(network("network"), network("baseline") if has_baseline else None, metadata)
 
 
 def describe(model: KinematicModel) -> dict[str, Any]:
-    """Return what a weight file must agree on with its model: parameters, camera and input."""
-    camera, image = model.camera, model.input
+    """Return what a weight file must agree on with its model: parameters, bodies and camera."""
+    camera = model.camera
     return {
         "model": model.name,
         "parameters": [parameter.name for parameter in model.parameters],
         "limits": model.limits.tolist(),
+        "bodies": {
+            body.name: [
+                linear.tolist()
+                for part in (body.centre, body.size)
+                for linear in (part.constant, part.slope)
+            ]
+            for body in model.bodies
+        },
         "camera": {
             **{key: getattr(camera, key) for key in ("width", "height", "fx", "fy", "cx", "cy")},
             "pose": camera.pose.round(9).tolist(),
         },
-        "input": vars(image).copy(),
     }
 
 
@@ -107,6 +125,22 @@ def _check(name: str, metadata: Mapping[str, Any], model: KinematicModel) -> Non
                 f"{name} was trained for another model: its {key} is {metadata.get(key)}, "
                 f"that of model '{model.name}' is {expected}"
             )
+
+
+def _build(name: str, model: KinematicModel, design: Mapping[str, Any]) -> MorphNetwork:
+    """Return an untrained network of a design, see ``MorphNetwork.describe``."""
+    if "cascade" in design:
+        try:
+            settings = CascadeSettings.read(Section(design["cascade"], f"{name}: design"))
+        except ConfigurationError as error:
+            raise WeightsError(f"{name} describes no network of ours: {error}") from error
+        return Cascade(model, settings, design["stages"])
+    if design["input"] != vars(model.input):
+        raise WeightsError(
+            f"{name} was trained for another model: its input is {design['input']}, "
+            f"that of model '{model.name}' is {vars(model.input)}"
+        )
+    return PaperNetwork(model, design["channels"])
 
 
 def _fill(name: str, network: nn.Module, state: Mapping[str, Any]) -> None:

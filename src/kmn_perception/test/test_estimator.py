@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
 
 SETTINGS = EstimatorSettings(
@@ -18,9 +19,10 @@ def door() -> MorphEstimator:
     return MorphEstimator.load("door", "", SETTINGS)
 
 
-def observe(estimator: MorphEstimator, theta: list, gamma: list) -> np.ndarray:
+def observe(estimator: MorphEstimator, theta: list, gamma: list) -> Observation:
     model = estimator.model
-    return depth_to_cloud(render(model.unit_cubes(theta, gamma), model.camera), model.camera)
+    depth = render(model.unit_cubes(theta, gamma), model.camera)
+    return Observation(depth_to_cloud(depth, model.camera), model.camera)
 
 
 def test_a_door_in_view_is_ok_and_its_points_lie_on_the_model(door: MorphEstimator) -> None:
@@ -36,14 +38,16 @@ def test_a_door_in_view_is_ok_and_its_points_lie_on_the_model(door: MorphEstimat
 
 
 def test_no_points_are_no_object(door: MorphEstimator) -> None:
-    estimate = door.estimate(np.empty((0, 3), dtype=np.float32))
+    nothing = np.empty((0, 3), dtype=np.float32)
+    estimate = door.estimate(Observation(nothing, door.model.camera))
     assert estimate.status is Status.NO_OBJECT
     assert np.isnan(estimate.theta).all()
     assert np.isnan(estimate.residual)
 
 
 def test_few_points_are_counted(door: MorphEstimator) -> None:
-    estimate = door.estimate(observe(door, [0.0] * 3, [0.0] * 4)[:50])
+    whole = observe(door, [0.0] * 3, [0.0] * 4)
+    estimate = door.estimate(replace(whole, points=whole.points[:50]))
     assert estimate.status is Status.TOO_FEW_POINTS
     assert estimate.reason == "50 points, at least 100 are needed"
     assert estimate.points_used == 50
@@ -52,7 +56,7 @@ def test_few_points_are_counted(door: MorphEstimator) -> None:
 def test_a_box_is_not_taken_for_a_door(door: MorphEstimator) -> None:
     generator = np.random.default_rng(0)
     heap = generator.uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], (5000, 3)).astype(np.float32)
-    assert door.estimate(heap).status is not Status.OK
+    assert door.estimate(Observation(heap, door.model.camera)).status is not Status.OK
 
 
 def test_a_door_far_outside_is_not_ok(door: MorphEstimator) -> None:

@@ -1,56 +1,79 @@
-"""Algorithm 1 with a network whose answer is known."""
+"""Algorithm 1 with networks whose answer is known."""
+
+from itertools import islice
 
 import numpy as np
 import pytest
 import torch
 
+from kmn_perception.cascade import Cascade, CascadeSettings
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predict, predictions, start
+from kmn_perception.morph import predict, predictions
 from kmn_perception.network import MorphNetwork
+from kmn_perception.observation import Observation
+from kmn_perception.paper_network import PaperNetwork
 from kmn_perception.rendering import depth_to_cloud, render
 
 
-class Constant(MorphNetwork):
-    """A network that answers the same (theta, gamma) to every image."""
+def constant_paper_network(model: KinematicModel, answer: list) -> PaperNetwork:
+    """Return a network that answers the same (theta, gamma) to every image."""
+    network = PaperNetwork(model, [1, 1, 1, 1, 1])
+    with torch.no_grad():
+        network.linear.weight.zero_()
+        network.linear.bias.copy_(network.encoding.encode(torch.tensor([answer]))[0])
+    return network
 
-    def __init__(self, model: KinematicModel, answer: list) -> None:
-        super().__init__(model, [1, 1, 1, 1, 1])
-        with torch.no_grad():
-            self.linear.weight.zero_()
-            self.linear.bias.copy_(self.encoding.encode(torch.tensor([answer]))[0])
+
+def constant_cascade(model: KinematicModel, answers: list) -> Cascade:
+    """Return a cascade whose stages answer one after the other."""
+    network = Cascade(model, CascadeSettings.load(), len(answers))
+    with torch.no_grad():
+        for step, answer in enumerate(answers):
+            stage = network.stage(step)
+            last = stage.head[2]
+            assert isinstance(last, torch.nn.Linear)
+            last.weight.zero_()
+            last.bias.copy_(stage.encoding.encode(torch.tensor([answer]))[0])
+    return network
 
 
-def cloud_of(model: KinematicModel, values: np.ndarray) -> np.ndarray:
-    return depth_to_cloud(
-        render(model.unit_cubes(*model.split(values)), model.camera), model.camera
-    )
+def observe(model: KinematicModel, values: np.ndarray) -> Observation:
+    depth = render(model.unit_cubes(*model.split(values)), model.camera)
+    return Observation(depth_to_cloud(depth, model.camera), model.camera)
 
 
 def test_predictions_are_concatenated() -> None:
     """T = T_bar T_bar T_bar: a turn of 0.1 rad and a step of 0.1 m, three times."""
     model = KinematicModel.load("box_b")
-    network = Constant(model, [0.1, 0.0, 0.1])
-    cloud = cloud_of(model, np.zeros(3))
-    prediction, iterations = predict(model, network, [cloud], np.zeros((1, 3)), steps=3)
+    network = constant_paper_network(model, [0.1, 0.0, 0.1])
+    prediction, iterations = predict(network, [observe(model, np.zeros(3))], steps=3)
     turns = np.array([0.0, 0.1, 0.2])
     expected = [0.1 * np.cos(turns).sum(), 0.1 * np.sin(turns).sum(), 0.3]
     np.testing.assert_allclose(prediction.values[0], expected, atol=1e-6)
     assert iterations == 3
 
 
-def test_gamma_is_that_of_the_last_prediction() -> None:
+def test_the_papers_gamma_is_that_of_the_last_prediction() -> None:
     model = KinematicModel.load("door")
     answer = [0.0, 0.0, 0.0, 0.1, -0.1, 0.02, 0.05]
-    cloud = cloud_of(model, np.zeros(7))
-    prediction, _ = predict(model, Constant(model, answer), [cloud], np.zeros((1, 3)), steps=4)
+    network = constant_paper_network(model, answer)
+    prediction, _ = predict(network, [observe(model, np.zeros(7))], steps=4)
     np.testing.assert_allclose(prediction.values[0], answer, atol=1e-6)
+
+
+def test_a_cascade_adds_up_gamma_and_ends_after_its_stages() -> None:
+    model = KinematicModel.load("door")
+    answers = [[0.0, 0.0, 0.0, 0.1, -0.1, 0.02, 0.05], [0.1, 0.0, 0.0, -0.2, 0.05, 0.0, 0.01]]
+    network = constant_cascade(model, answers)
+    prediction, iterations = predict(network, [observe(model, np.zeros(7))], steps=5)
+    np.testing.assert_allclose(prediction.values[0], np.sum(answers, axis=0), atol=1e-6)
+    assert iterations == 2
 
 
 def test_it_stops_when_the_prediction_is_near_the_identity() -> None:
     model = KinematicModel.load("box_a")
-    network = Constant(model, [0.001, 0.0])
-    cloud = cloud_of(model, np.zeros(2))
-    _, iterations = predict(model, network, [cloud], np.zeros((1, 2)), steps=5, tolerance=0.002)
+    network = constant_paper_network(model, [0.001, 0.0])
+    _, iterations = predict(network, [observe(model, np.zeros(2))], steps=5, tolerance=0.002)
     assert iterations == 1
 
 
@@ -58,24 +81,61 @@ def test_a_right_prediction_shows_the_prototype() -> None:
     """After the true theta, the depth image is that of the prototype (Equation 1)."""
     model = KinematicModel.load("box_a")
     truth = np.array([0.2, -0.1])
-    state = next(
-        predictions(
-            model, Constant(model, truth.tolist()), [cloud_of(model, truth)], np.zeros((1, 2))
-        )
-    )
-    prototype = next(
-        predictions(
-            model, Constant(model, [0.0, 0.0]), [cloud_of(model, 0 * truth)], np.zeros((1, 2))
-        )
-    )
-    seen = (state.depth > 0.0) & (prototype.depth > 0.0)
-    assert seen.sum() > 0.7 * (prototype.depth > 0.0).sum()
-    np.testing.assert_allclose(np.median(state.depth[seen] - prototype.depth[seen]), 0.0, atol=2e-3)
+    network = constant_paper_network(model, truth.tolist())
+    observation = observe(model, truth)
+    values = next(predictions(network, [observation])).values
+    (morphed,) = network.render_anew(1, [observation], values)
+    (prototype,) = network.render_anew(0, [observe(model, 0.0 * truth)], np.zeros((1, 2)))
+    seen = (morphed > 0.0) & (prototype > 0.0)
+    assert seen.sum() > 0.7 * (prototype > 0.0).sum()
+    np.testing.assert_allclose(np.median(morphed[seen] - prototype[seen]), 0.0, atol=2e-3)
 
 
 @pytest.mark.parametrize(
     ("name", "expected"), [("box_b", [0, 0, 0]), ("box", [0.3, -0.2, 0, 0, 0, 0])]
 )
-def test_it_starts_at_the_prototype_or_above_the_centroid(name: str, expected: list) -> None:
-    cloud = np.array([[0.2, -0.3, 0.1], [0.4, -0.1, 0.2]], dtype=np.float32)
-    np.testing.assert_allclose(start(KinematicModel.load(name), [cloud]), [expected], atol=1e-6)
+def test_the_paper_starts_at_the_prototype_or_above_the_centroid(name: str, expected: list) -> None:
+    model = KinematicModel.load(name)
+    points = np.array([[0.2, -0.3, 0.1], [0.4, -0.1, 0.2]], dtype=np.float32)
+    network = constant_paper_network(model, [0.0] * len(model.parameters))
+    start = network.start([Observation(points, model.camera)])
+    np.testing.assert_allclose(start, [expected], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["box_a", "box_c", "door"])
+def test_a_cascade_starts_where_the_points_are(name: str) -> None:
+    """For points of the prototype, moved without being seen anew, this is the whole motion."""
+    model = KinematicModel.load(name)
+    network = Cascade(model, CascadeSettings.load(), stages=0)
+    prototype = observe(model, np.zeros(len(model.parameters)))
+    moved = Observation(prototype.points + np.float32([0.2, -0.1, 0.0]), model.camera)
+    expected = np.zeros((2, len(model.parameters)))
+    expected[1, :2] = 0.2, -0.1
+    np.testing.assert_allclose(network.start([prototype, moved]), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["box_b", "box_c", "door", "box"])
+def test_a_network_undoes_what_it_leaves(name: str) -> None:
+    """What is left to predict, predicted, gives the truth."""
+    model = KinematicModel.load(name)
+    generator = np.random.default_rng(0)
+    values, truth = model.sample(generator, 50), model.sample(generator, 50)
+    networks: list[MorphNetwork] = [
+        constant_paper_network(model, [0.0] * len(model.parameters)),
+        Cascade(model, CascadeSettings.load(), stages=0),
+    ]
+    for network in networks:
+        left = network.remainder(values, truth)
+        np.testing.assert_allclose(network.concatenate(values, left), truth, atol=1e-9)
+
+
+def test_observations_are_predicted_together_as_alone() -> None:
+    model = KinematicModel.load("door")
+    torch.manual_seed(0)
+    network = Cascade(model, CascadeSettings.load(), stages=2).eval()
+    truths = model.sample(np.random.default_rng(1), 3) * 0.3
+    seen = [observe(model, truth) for truth in truths]
+    together = list(islice(predictions(network, seen), 2))[-1].values
+    for observation, values in zip(seen, together, strict=True):
+        alone, _ = predict(network, [observation], steps=2)
+        np.testing.assert_allclose(alone.values[0], values, atol=1e-5)

@@ -7,14 +7,20 @@ from types import ModuleType
 import numba
 import yaml
 
-from kmn_perception import observation, rendering, residual, resources, segmentation
+from kmn_perception import observation, rendering, residual, resources, segmentation, windows
 from kmn_perception.estimator import MorphEstimator, Status
 from kmn_perception.node_parameters import NodeSettings
 from kmn_perception.pipeline import MorphPipeline
 
 from .conftest import RealFrame
 
-COMPILED: tuple[ModuleType, ...] = (observation, rendering, residual, segmentation)
+COMPILED: tuple[ModuleType, ...] = (
+    observation,
+    rendering,
+    residual,
+    segmentation,
+    windows,
+)
 
 
 def compiled_signatures() -> dict[str, int]:

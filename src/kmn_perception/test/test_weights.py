@@ -3,13 +3,15 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
 from kmn_perception import weights
+from kmn_perception.cascade import Cascade, CascadeSettings
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.network import MorphNetwork
+from kmn_perception.paper_network import PaperNetwork
 
 DOOR = KinematicModel.load("door")
 CHANNELS = [1, 1, 2, 2, 3]
@@ -18,8 +20,8 @@ CHANNELS = [1, 1, 2, 2, 3]
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "mine.safetensors"
-    metadata = {**weights.describe(DOOR), "channels": CHANNELS, "training": {"seed": 7}}
-    networks = MorphNetwork(DOOR, CHANNELS), MorphNetwork(DOOR, CHANNELS)
+    metadata = {**weights.describe(DOOR), "training": {"seed": 7}}
+    networks = PaperNetwork(DOOR, CHANNELS), PaperNetwork(DOOR, CHANNELS)
     weights.save(path, weights.Weights(*networks, metadata))
     return path
 
@@ -27,11 +29,38 @@ def file(tmp_path: Path) -> Path:
 def test_networks_and_metadata_come_back(file: Path) -> None:
     loaded = weights.load(file, DOOR)
     stored = load_file(str(file))
-    for name, tensor in loaded.kmn.state_dict().items():
-        torch.testing.assert_close(tensor, stored[f"kmn.{name}"])
+    for name, tensor in loaded.network.state_dict().items():
+        torch.testing.assert_close(tensor, stored[f"network.{name}"])
+    assert loaded.baseline is not None
     for name, tensor in loaded.baseline.state_dict().items():
         torch.testing.assert_close(tensor, stored[f"baseline.{name}"])
     assert loaded.metadata["training"] == {"seed": 7}
+
+
+def test_a_cascade_comes_back_with_the_same_predictions(tmp_path: Path) -> None:
+    torch.manual_seed(3)
+    network = Cascade(DOOR, CascadeSettings.load(), stages=2).eval()
+    path = tmp_path / "cascade.safetensors"
+    weights.save(path, weights.Weights(network, None, weights.describe(DOOR)))
+    loaded = weights.load(path, DOOR)
+    assert loaded.baseline is None
+    assert loaded.network.steps == 2
+    images = [torch.rand(1, *kind.shape).numpy() for kind in network.input_types(1)]
+    np.testing.assert_allclose(
+        loaded.network.predict(1, tuple(images)), network.predict(1, tuple(images)), atol=1e-6
+    )
+
+
+def test_a_design_that_is_none_of_ours_is_refused(tmp_path: Path, file: Path) -> None:
+    metadata = {
+        **weights.describe(DOOR),
+        "design": {"cascade": {"margins": []}, "stages": 1},
+        "format": weights.FORMAT,
+    }
+    text = {key: json.dumps(value) for key, value in metadata.items()}
+    save_file(load_file(str(file)), str(file), text)
+    with pytest.raises(weights.WeightsError, match="describes no network of ours"):
+        weights.load(file, DOOR)
 
 
 def test_missing_weights_are_named() -> None:
@@ -60,7 +89,8 @@ def test_a_foreign_safetensors_file_is_refused(file: Path) -> None:
 
 
 def test_a_file_with_other_tensors_than_it_says_is_refused(file: Path) -> None:
-    metadata = {**weights.describe(DOOR), "channels": [2, 2, 2, 2, 2], "format": weights.FORMAT}
+    design = {"channels": [2, 2, 2, 2, 2], "input": vars(DOOR.input)}
+    metadata = {**weights.describe(DOOR), "design": design, "format": weights.FORMAT}
     text = {key: json.dumps(value) for key, value in metadata.items()}
     save_file(load_file(str(file)), str(file), text)
     with pytest.raises(weights.WeightsError, match="does not hold the network that it describes"):

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
@@ -17,9 +16,8 @@ from kmn_perception.messages import (
     parameters_from_estimate,
     points_from_cloud,
 )
-from kmn_perception.morph import predict, start
+from kmn_perception.morph import predict
 from kmn_perception.node_parameters import NodeSettings
-from kmn_perception.observation import point_cloud_to_depth
 from kmn_perception.pipeline import MorphPipeline
 
 STEPS = 5  # predictions, as in the paper
@@ -53,18 +51,16 @@ def chain(
     observation = pipeline.observe(points)
     if observation is None or not len(observation.points):
         raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
-    seen = observation.points
-    depth = torch.from_numpy(point_cloud_to_depth(model, seen, np.eye(4))[None])
+    seen, first = [observation], network.start([observation])
+    images = network.render_anew(0, seen, first)
     return {
         "message_to_array": message_to_array,
         "background_removal": lambda: pipeline.observe(points),
-        "splat": lambda: point_cloud_to_depth(model, seen, np.eye(4)),
-        "network": lambda: network.predict(depth),
-        f"prediction_{STEPS}_steps": lambda: predict(
-            model, network, [seen], start(model, [seen]), STEPS
-        ),
+        "render_anew": lambda: network.render_anew(0, seen, first),
+        "network": lambda: network.predict(0, images),
+        "prediction_all_steps": lambda: predict(network, seen, STEPS),
         "callback": callback,
-    }, len(seen)
+    }, len(observation.points)
 
 
 def measure(chain: dict[str, Stage], repetitions: int) -> dict[str, dict[str, float]]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import Clouds, predictions, start
+from kmn_perception.morph import predictions
 from kmn_perception.network import MorphNetwork
+from kmn_perception.observation import Observation
 
 
 def absolute_errors(
@@ -21,25 +22,20 @@ def absolute_errors(
 
 
 def values_by_step(
-    model: KinematicModel, network: MorphNetwork, clouds: Clouds
+    network: MorphNetwork, observations: Sequence[Observation]
 ) -> Iterator[NDArray[np.float64]]:
-    """Yield the estimates (B, n + m) after 0, 1, ... predictions, without end.
-
-    Before the first prediction it is the start of Algorithm 1 with gamma_0 = 0.
-    """
-    theta = start(model, clouds)
-    yield np.concatenate((theta, np.zeros((len(theta), len(model.gamma)))), axis=1)
-    for state in predictions(model, network, clouds, theta):
+    """Yield the estimates (B, n + m) after 0, 1, ... predictions, as many as the network makes."""
+    yield network.start(observations)
+    for state in predictions(network, observations):
         yield state.values
 
 
 def errors_by_step(
-    model: KinematicModel,
     network: MorphNetwork,
-    clouds: Clouds,
+    observations: Sequence[Observation],
     truth: NDArray[np.float64],
     steps: int,
 ) -> NDArray[np.float64]:
-    """Return the absolute errors (steps + 1, B, n + m) after 0, 1, ..., ``steps`` predictions."""
-    values = np.stack(list(islice(values_by_step(model, network, clouds), steps + 1)))
-    return absolute_errors(model, values, truth)
+    """Return the absolute errors (S, B, n + m) after 0, 1, ..., at most ``steps`` predictions."""
+    values = np.stack(list(islice(values_by_step(network, observations), steps + 1)))
+    return absolute_errors(network.model, values, truth)

@@ -23,6 +23,7 @@ from kmn_perception.evaluation.methods import METHODS, Method, MethodError, choo
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.table import report
 from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.observation import Observation
 from kmn_perception.sensor import NOISES
 from kmn_perception.training.samples import EVALUATION, sample
 from kmn_perception.training.settings import SensorSettings
@@ -50,10 +51,10 @@ class Tally:
         self._errors: list[NDArray[np.float64]] = []  # each (steps + 1, n + m)
         self._seconds: list[float] = []
 
-    def add(self, cloud: NDArray[np.float32], truth: NDArray[np.float64]) -> None:
-        """Estimate the parameters of a cloud (N, 3) and compare them with the truth (n + m,)."""
+    def add(self, observation: Observation, truth: NDArray[np.float64]) -> None:
+        """Estimate the parameters of an observation and compare them with the truth (n + m,)."""
         started = time.perf_counter()
-        estimates = self._method.estimates(cloud)
+        estimates = self._method.estimates(observation)
         values = list(islice(estimates, self._method.counted + 1))
         self._seconds.append(time.perf_counter() - started)
         values += islice(estimates, self._steps - self._method.counted)
@@ -103,7 +104,7 @@ def evaluate(
     for index in bar:
         observation, truth = sample(model, options.seed, index, sensor, noise, EVALUATION)
         for tally in tallies.values():
-            tally.add(observation.points, truth)
+            tally.add(observation, truth)
     return {
         "model": model.name,
         "samples": options.samples,

@@ -13,6 +13,7 @@ from kmn_perception.evaluation.icp import align
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.network import MorphNetwork
+from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.weights import Weights
 
@@ -28,28 +29,30 @@ class Method:
     Attributes
     ----------
     estimates
-        Maps a cloud (N, 3) to the estimates (n + m,) after 0, 1, 2, ... steps.
+        Maps an observation to the estimates (n + m,) after 0, 1, 2, ... steps.
     counted
         Number of the step whose estimate is the result.
     """
 
-    estimates: Callable[[NDArray[np.float32]], Iterator[NDArray[np.float64]]]
+    estimates: Callable[[Observation], Iterator[NDArray[np.float64]]]
     counted: int
 
 
 def baseline(model: KinematicModel, weights: Weights, settings: EvaluationSettings) -> Method:
     """Return a single prediction of the network before its data were augmented."""
-    return _iterated(model, weights.baseline, 1)
+    if weights.baseline is None:
+        raise MethodError(f"the weights of '{model.name}' hold no baseline")
+    return _iterated(weights.baseline, 1)
 
 
 def kmn(model: KinematicModel, weights: Weights, settings: EvaluationSettings) -> Method:
-    """Return N predictions of the network after Algorithm 2."""
-    return _iterated(model, weights.kmn, settings.steps)
+    """Return the last prediction of the network, or the N-th if it may go on and on."""
+    return _iterated(weights.network, weights.network.steps or settings.steps)
 
 
-def _iterated(model: KinematicModel, network: MorphNetwork, counted: int) -> Method:
-    def estimates(cloud: NDArray[np.float32]) -> Iterator[NDArray[np.float64]]:
-        return (values[0] for values in values_by_step(model, network, [cloud]))
+def _iterated(network: MorphNetwork, counted: int) -> Method:
+    def estimates(observation: Observation) -> Iterator[NDArray[np.float64]]:
+        return (values[0] for values in values_by_step(network, [observation]))
 
     return Method(estimates, counted)
 
@@ -67,8 +70,9 @@ def icp(model: KinematicModel, weights: Weights, settings: EvaluationSettings) -
     zero = np.zeros(len(model.theta))
     prototype = depth_to_cloud(render(model.unit_cubes(zero, ()), model.camera), model.camera)
 
-    def estimates(cloud: NDArray[np.float32]) -> Iterator[NDArray[np.float64]]:
+    def estimates(observation: Observation) -> Iterator[NDArray[np.float64]]:
         yield zero
+        cloud = observation.points
         count = min(len(cloud), settings.icp_points)
         drawn = np.random.default_rng(0).choice(len(cloud), count, replace=False)
         to_prototype = align(cloud[drawn], prototype, settings.icp_iterations)

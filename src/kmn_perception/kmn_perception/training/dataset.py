@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,37 +10,44 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from kmn_perception.kinematic_model import KinematicModel
-
-LEVELS = 65535  # depth in [0, 1] is stored in steps of 1/65535
+from kmn_perception.network import Inputs, InputType
 
 
 class Dataset:
-    """Depth images (H, W) and what is to be predicted for them, up to a fixed capacity.
+    """A network's inputs and what is to be predicted for them, up to a fixed capacity.
 
     Parameters
     ----------
     folder
-        Where the two arrays lie; an existing data set there is continued.
+        Where the arrays lie; an existing data set there is continued.
+    inputs
+        The network's inputs.
+    parameters
+        Number n + m of morphing parameters.
     """
 
-    def __init__(self, folder: Path, model: KinematicModel, capacity: int) -> None:
+    def __init__(
+        self, folder: Path, inputs: Sequence[InputType], parameters: int, capacity: int
+    ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        shape = (capacity, model.input.height, model.input.width)
-        self.depth = _memory_map(folder / "depth.npy", shape, np.dtype(np.uint16))
+        self.inputs = [
+            _memory_map(folder / f"input{i}.npy", (capacity, *shape), np.dtype(dtype))
+            for i, (shape, dtype) in enumerate(inputs)
+        ]
         self.values = _memory_map(
-            folder / "values.npy", (capacity, len(model.parameters)), np.dtype(np.float64)
+            folder / "values.npy", (capacity, parameters), np.dtype(np.float64)
         )
 
-    def put(self, index: int, depth: NDArray[np.float32], values: NDArray[np.float64]) -> None:
-        """Store a depth image (H, W) in [0, 1] with its (theta, gamma)."""
-        self.depth[index] = np.round(depth * LEVELS).astype(np.uint16)
-        self.values[index] = values
+    def put(self, rows: slice, inputs: Inputs, values: NDArray[np.float64]) -> None:
+        """Store inputs (B, ...) with their (theta, gamma) (B, n + m)."""
+        for array, part in zip(self.inputs, inputs, strict=True):
+            array[rows] = part
+        self.values[rows] = values
 
-    def batch(self, indices: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-        """Return depth images (B, H, W) and (theta, gamma) (B, n + m), float32."""
-        depth = torch.from_numpy(self.depth[indices].astype(np.float32) / LEVELS)
-        return depth, torch.from_numpy(self.values[indices].astype(np.float32))
+    def batch(self, rows: NDArray[np.int64] | slice) -> tuple[list[Tensor], Tensor]:
+        """Return inputs (B, ...) and (theta, gamma) (B, n + m), float32."""
+        inputs = [torch.from_numpy(array[rows].astype(np.float32)) for array in self.inputs]
+        return inputs, torch.from_numpy(self.values[rows].astype(np.float32))
 
 
 def _memory_map(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from kmn_perception import resources
@@ -40,18 +40,20 @@ class SensorSettings:
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """What Algorithm 2 needs to know beside the model.
+    """What a training needs to know beside the model.
 
     Attributes
     ----------
+    network
+        ``paper``: the paper's network and Algorithm 2; ``cascade``: ours, stage by stage.
     channels
-        Output channels of the convolutions (the paper's table).
+        Of the paper's network: output channels of the convolutions (the paper's table).
     samples
-        N_data, the size of the initial data set.
+        N_data, the size of the initial data set; of ours, the fresh samples for each stage.
     augmentation
-        N_aug as a share of N_data.
+        Of the paper's network: N_aug as a share of N_data.
     rounds
-        Largest number of augmentations and retrainings.
+        Largest number of augmentations and retrainings; ours has one stage more than that.
     epochs, retrain_epochs
         Passes through the data in the first training and in each retraining.
     patience
@@ -62,6 +64,7 @@ class TrainingSettings:
         ``None``: exact depth from the canonical camera, as in the paper.
     """
 
+    network: str
     channels: tuple[int, ...]
     samples: int
     augmentation: float
@@ -78,20 +81,22 @@ class TrainingSettings:
     def load(cls, name_or_path: str | Path) -> TrainingSettings:
         """Read the settings; raise ``ConfigurationError`` with the key that is wrong."""
         section = Section.load(resources.find("config/training", name_or_path))
+        paper = section.text("network", ("paper", "cascade")) == "paper"
         section.allow(
             (
-                "channels", "samples", "augmentation", "rounds", "epochs", "retrain_epochs",
-                "patience", "batch", "learning_rate", "seed",
+                "network", "samples", "rounds", "epochs", "retrain_epochs", "patience", "batch",
+                "learning_rate", "seed", *(("channels", "augmentation") if paper else ()),
             ),
             ("sensor",),
         )  # fmt: skip
-        channels = section.numbers("channels", 5)
-        if min(channels) < 1:
-            raise section.error(f"'channels' must be at least 1, found {channels}")
+        channels = section.whole_numbers("channels", 1, 4096) if paper else []
+        if paper and len(channels) != 5:
+            raise section.error(f"'channels' must be 5 numbers, found {channels}")
         return cls(
-            channels=tuple(int(channel) for channel in channels),
+            network=section.text("network"),
+            channels=tuple(channels),
             samples=section.whole_number("samples", 10, 10**8),
-            augmentation=section.number("augmentation", 0.0, 10.0),
+            augmentation=section.number("augmentation", 0.0, 10.0) if paper else 0.0,
             rounds=section.whole_number("rounds", 0, 100),
             epochs=section.whole_number("epochs", 1, 10**5),
             retrain_epochs=section.whole_number("retrain_epochs", 1, 10**5),
@@ -100,6 +105,45 @@ class TrainingSettings:
             learning_rate=section.number("learning_rate", 0.0, 1.0),
             seed=section.whole_number("seed", 0, 2**31),
             sensor=_sensor(section.section("sensor")) if "sensor" in section else None,
+        )
+
+
+@dataclass(frozen=True)
+class StagewiseSettings:
+    """How our network is trained, the same for all models.
+
+    Attributes
+    ----------
+    shuffled
+        How often a sample is used with the errors of other samples, beside its own.
+    spread
+        These errors are multiplied by a random factor of up to this.
+    rounding
+        Errors smaller than this, in units of the mean error to predict, count by their square.
+    standardised
+        Number of samples that give the images' mean and deviation.
+    least_deviation
+        Added to the deviations, for pixels that hardly ever change.
+    """
+
+    shuffled: int
+    spread: float
+    rounding: float
+    standardised: int
+    least_deviation: float
+
+    @classmethod
+    def load(cls) -> StagewiseSettings:
+        """Read ``config/cascade.yaml``; raise ``ConfigurationError`` with the key that is wrong."""
+        section = Section.load(resources.share_directory() / "config/cascade.yaml")
+        training = section.section("training")
+        training.allow([field.name for field in fields(cls)])
+        return cls(
+            shuffled=training.whole_number("shuffled", 0, 100),
+            spread=training.number("spread", 0.0, 10.0),
+            rounding=training.number("rounding", 1e-6, 10.0),
+            standardised=training.whole_number("standardised", 2, 10**6),
+            least_deviation=training.number("least_deviation", 1e-6, 1.0),
         )
 
 

@@ -19,6 +19,8 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.training.algorithm2 import Algorithm2
 from kmn_perception.training.run import Run, RunError
 from kmn_perception.training.settings import TrainingSettings
+from kmn_perception.training.stagewise import StagewiseTraining
+from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
 
 
@@ -30,8 +32,8 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--config", help="name or YAML file of the settings (default: the model's)")
     parser.add_argument("--samples", type=int, help="N_data in place of the settings'")
     parser.add_argument("--epochs", type=int, help="epochs of the first training")
-    parser.add_argument("--retrain-epochs", type=int, help="epochs of each retraining")
-    parser.add_argument("--rounds", type=int, help="largest number of retrainings")
+    parser.add_argument("--retrain-epochs", type=int, help="epochs of each later round")
+    parser.add_argument("--rounds", type=int, help="largest number of later rounds")
     parser.add_argument("--seed", type=int, help="seed of data, initialisation and order")
     parser.add_argument("--run", type=Path, help="folder of the run (default: beside --out)")
     parser.add_argument("--restart", action="store_true", help="discard an earlier run")
@@ -60,31 +62,32 @@ def train(options: argparse.Namespace) -> None:
             shutil.rmtree(folder)
         known = {
             **weights.describe(model),
-            "channels": list(settings.channels),
             "training": dataclasses.asdict(settings),
         }
         run = Run(folder, {**known, "processes": workers.count})
         for interruption in (signal.SIGINT, signal.SIGTERM):
             signal.signal(interruption, run.interrupt)
-        algorithm = Algorithm2(model, settings, run, workers)
+        kind = Algorithm2 if settings.network == "paper" else StagewiseTraining
+        training = kind(model, settings, run, workers)
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
         )
-        algorithm.train()
+        training.train()
         if workers.rank == 0:
-            weights.save(options.out, _result(algorithm, known))
+            weights.save(options.out, _result(training, known))
             workers.say(f"wrote {options.out}")
 
 
-def _result(algorithm: Algorithm2, known: dict[str, Any]) -> weights.Weights:
-    state = algorithm.state
+def _result(training: Training, known: dict[str, Any]) -> weights.Weights:
+    state, networks = training.state, training.networks
     metadata = {
         **known,
         "errors": {"by_round_and_step": state.errors, "samples": "validation, never trained on"},
         "losses": state.losses,
         "seconds": round(state.seconds),
     }
-    return weights.Weights(algorithm.network.cpu(), algorithm.baseline.cpu(), metadata)
+    baseline = networks.get("baseline")
+    return weights.Weights(training.network.cpu(), baseline and baseline.cpu(), metadata)
 
 
 def main() -> None:

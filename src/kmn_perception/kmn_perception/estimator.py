@@ -15,6 +15,7 @@ from kmn_perception.morph import predict
 from kmn_perception.network import MorphNetwork
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
+from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.residual import surface_distances
 
 
@@ -44,6 +45,8 @@ class EstimatorSettings:
         Largest median distance of the points to the predicted surface, metres.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
+    refine
+        Fit the model to the observation after the predictions.
     """
 
     iterations: int
@@ -51,6 +54,7 @@ class EstimatorSettings:
     min_points: int
     max_residual: float
     limit_margin: float
+    refine: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +66,12 @@ class Estimate:
     theta, gamma
         (n,) and (m,) morphing parameters, metres, radians and scales.
     covariance
-        (n + m, n + m) over (theta, gamma).
+        (n + m, n + m) over (theta, gamma); NaN without refinement.
     transform
         (4, 4) T_theta, from the prototype to the world.
     iterations, converged
-        Number of predictions, and whether the last one was near the identity.
+        Number of predictions, and whether the last one was near the identity or the refinement
+        found the model in the observation.
     residual
         Median distance of the points to the predicted surface, metres.
     points_used
@@ -105,18 +110,23 @@ class Estimate:
 
 
 class MorphEstimator:
-    """Runs the kinematic morphing network of one model.
+    """Runs the kinematic morphing network of one model, and refines what it predicts.
 
     Attributes
     ----------
-    model, network, settings
+    model, network, settings, refinement
         May be replaced between two estimates.
     """
 
     def __init__(
-        self, model: KinematicModel, network: MorphNetwork, settings: EstimatorSettings
+        self,
+        model: KinematicModel,
+        network: MorphNetwork,
+        settings: EstimatorSettings,
+        refinement: RefinementSettings,
     ) -> None:
-        self.model, self.network, self.settings = model, network, settings
+        self.model, self.network = model, network
+        self.settings, self.refinement = settings, refinement
 
     @classmethod
     def load(
@@ -133,7 +143,8 @@ class MorphEstimator:
         """
         kinematic_model = KinematicModel.load(model)
         file = weights_file or kinematic_model.name
-        return cls(kinematic_model, weights.load(file, kinematic_model).network, settings)
+        network = weights.load(file, kinematic_model).network
+        return cls(kinematic_model, network, settings, RefinementSettings.load())
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
@@ -153,25 +164,40 @@ class MorphEstimator:
         prediction, iterations = predict(
             self.network, [observation], settings.iterations, settings.tolerance
         )
-        theta, gamma = model.split(prediction.values[0])
+        values, change = prediction.values[0], float(prediction.change[0])
+        covariance = np.full((len(values), len(values)), np.nan)
+        if settings.refine:
+            fit = refine(model, observation, values, self.refinement)
+            values, covariance, doubt = fit.values, fit.covariance, fit.reason
+        else:
+            doubt = self._doubt(change)
+        theta, gamma = model.split(values)
         residual = float(np.median(surface_distances(model.unit_cubes(theta, gamma), points)))
-        change = float(prediction.change[0])
-        status, reason = self._judge(prediction.values[0], change, residual)
+        status, reason = self._judge(values, residual, doubt)
         return Estimate(
             theta=theta,
             gamma=gamma,
-            covariance=np.full((len(model.parameters),) * 2, np.nan),
+            covariance=covariance,
             transform=model.transformation.matrix(theta),
             iterations=iterations,
-            converged=change <= settings.tolerance,
+            converged=not doubt,
             residual=residual,
             points_used=len(points),
             status=status,
             reason=reason,
         )
 
+    def _doubt(self, change: float) -> str:
+        """Return why a prediction that changed theta by so much is not the last one."""
+        if change <= self.settings.tolerance:
+            return ""
+        return (
+            f"the last prediction still changed theta by {change:.3f}, "
+            f"more than {self.settings.tolerance:g}"
+        )
+
     def _judge(
-        self, values: NDArray[np.float64], change: float, residual: float
+        self, values: NDArray[np.float64], residual: float, doubt: str
     ) -> tuple[Status, str]:
         """Return the status of an estimate, and the reason if it is not OK."""
         settings = self.settings
@@ -186,9 +212,4 @@ class MorphEstimator:
                 f"the points lie {residual:.3f} m from the model, "
                 f"more than {settings.max_residual:g} m"
             )
-        if not change <= settings.tolerance:
-            return Status.NOT_CONVERGED, (
-                f"the last prediction still changed theta by {change:.3f}, "
-                f"more than {settings.tolerance:g}"
-            )
-        return Status.OK, ""
+        return (Status.NOT_CONVERGED, doubt) if doubt else (Status.OK, "")

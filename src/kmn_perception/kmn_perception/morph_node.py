@@ -239,8 +239,9 @@ class MorphNode(Node):
                 pipeline = _load(settings)
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
+        loaded = pipeline.estimator
         estimator = MorphEstimator(
-            pipeline.estimator.model, pipeline.estimator.network, settings.estimator
+            loaded.model, loaded.network, settings.estimator, loaded.refinement
         )
         self._active = Active(settings, MorphPipeline(estimator, settings.pipeline))
         return SetParametersResult(successful=True)

@@ -183,10 +183,15 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "cluster_step": _real("Larger steps between neighbours part clusters [m].", 0.001, 1.0),
     "cluster_min_points": _whole("Smaller clusters are not objects.", 1, 1_000_000),
     "iterations": _whole("Largest number N of predictions (Algorithm 1).", 1, 100),
-    "tolerance": _real("Converged when a step changes theta by less [m, rad, 1].", 0.0, 1.0),
+    "tolerance": _real(
+        "Without refinement: converged when the last step changed theta by less [m, rad, 1].",
+        0.0,
+        1.0,
+    ),
     "min_points": _whole("Objects of fewer points are not estimated.", 1, 1_000_000),
     "max_residual": _real("Largest median distance of the points to the model [m].", 0.0, 10.0),
     "limit_margin": _real(
         "Part of its range by which a parameter may exceed its limits.", 0.0, 1.0
     ),
+    "refine": _any("Fit the model to the observation after the predictions."),
 }

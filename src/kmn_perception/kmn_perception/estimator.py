@@ -14,8 +14,8 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.morph import predict
 from kmn_perception.network import MorphNetwork
 from kmn_perception.observation import Observation
-from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.refinement import RefinementSettings, refine
+from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
 

@@ -21,15 +21,16 @@ def render(unit_cubes: NDArray[np.float64], camera: Camera) -> NDArray[np.float3
     Returns
     -------
     depth
-        (height, width) metres along the optical axis; NaN where there is nothing.
+        (height, width) metres along the optical axis; NaN where there is nothing, or something
+        nearer or farther than the camera measures.
     """
     depth = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
     for cube in unit_cubes:
         cube_to_camera = camera.world_to_camera @ cube
         window = _window(cube_to_camera, camera)
-        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, camera.near, camera.far, window)
-    depth[np.isinf(depth)] = np.nan
+        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, window)
+    depth[(depth < camera.near) | (depth > camera.far)] = np.nan
     return depth
 
 
@@ -96,8 +97,6 @@ def _cast(
     fy: float,
     cx: float,
     cy: float,
-    near: float,
-    far: float,
     window: tuple[int, int, int, int],
 ) -> None:
     """Lower ``depth`` to where the rays of the window enter the cube (slab method)."""
@@ -106,7 +105,7 @@ def _cast(
         ray_y = (v - cy) / fy
         for u in range(u0, u1):
             ray_x = (u - cx) / fx
-            enter, leave = near, far
+            enter, leave = 0.0, np.inf
             for axis in range(3):
                 slope = (
                     camera_to_cube[axis, 0] * ray_x

@@ -1,6 +1,7 @@
 """Rendering and splatting against the author's depth images and against geometry."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -117,3 +118,13 @@ def test_points_out_of_view_are_background(far_away: list) -> None:
     model = KinematicModel.load("box_a")
     cloud = np.array([far_away], dtype=np.float32)
     assert not point_cloud_to_depth(model, cloud, np.eye(4)).any()
+
+
+def test_what_is_too_near_or_too_far_is_not_measured() -> None:
+    """A box of 1 m at 0.5 m to 1.5 m from the camera: its front is at 0.5 m, and not its inside."""
+    cube = np.eye(4)[None].copy()
+    cube[0, 2, 3] = 1.0
+    camera = Camera(9, 9, 10.0, 10.0, 4.0, 4.0, np.eye(4), near=0.4, far=5.0)
+    np.testing.assert_allclose(render(cube, camera)[4, 4], 0.5)
+    assert np.isnan(render(cube, replace(camera, near=0.6))[4, 4])
+    assert np.isnan(render(cube, replace(camera, far=0.45))[4, 4])

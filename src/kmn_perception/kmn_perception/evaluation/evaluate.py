@@ -80,12 +80,14 @@ class Tally:
 def sensor_of(metadata: Mapping[str, Any], noise: str | None) -> tuple[SensorSettings | None, str]:
     """Return the sensor that weights were trained for, with its noise or that given instead.
 
-    Without a sensor it is the canonical camera, of which the training has no noise.
+    Without a sensor it is the canonical camera, of which the training has no noise. The camera's
+    pose is known here: what it is wrong by, no method could tell.
     """
     trained = metadata.get("training", {}).get("sensor")
     if trained is None:
         return None, noise or "none"
-    sensor = SensorSettings(**{**trained, "noise": noise or trained["noise"]})
+    known = {"noise": noise or trained["noise"], "pose_error": (0.0, 0.0)}
+    sensor = SensorSettings(**{**trained, **known})
     return sensor, sensor.noise
 
 

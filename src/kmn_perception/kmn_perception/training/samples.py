@@ -72,14 +72,41 @@ def _observe_from_around(
 ) -> Observation:
     cubes = model.unit_cubes(*model.split(values))
     camera = _place(_camera(sensor.camera), cubes[:, :3, 3].mean(axis=0), model, sensor, generator)
-    cloud = observe(model, values, camera, sensor.noise, generator).points
+    depth = add_noise(render(cubes, camera), sensor.noise, generator)
+    if generator.uniform() < sensor.holes:
+        _punch_holes(depth, generator)
+    believed = replace(camera, pose=_wrong(camera.pose, sensor.pose_error, generator))
+    cloud = depth_to_cloud(depth, believed)
     floor = generator.uniform(0.0, sensor.cut_height)
     cloud = cloud[cloud[:, 2] > floor]
     if len(cloud) and generator.uniform() < sensor.occlusion:
         direction = generator.standard_normal(3)
         along = cloud @ direction.astype(np.float32)
         cloud = cloud[along >= np.quantile(along, generator.uniform(0.0, 0.4))]
-    return Observation(cloud, camera, floor)
+    return Observation(cloud, believed, floor)
+
+
+def _punch_holes(depth: NDArray[np.float32], generator: np.random.Generator) -> None:
+    """Lose the depth in up to eight discs, as on shining or dark patches and in shadows."""
+    rows, columns = np.nonzero(~np.isnan(depth))
+    for _ in range(generator.integers(1, 9) if len(rows) else 0):
+        centre = generator.integers(len(rows))
+        radius = generator.uniform(2.0, 12.0)  # pixels
+        near = np.hypot(rows - rows[centre], columns - columns[centre]) < radius
+        depth[rows[near], columns[near]] = np.nan
+
+
+def _wrong(
+    pose: NDArray[np.float64], error: tuple[float, float], generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return a camera's pose as a slightly wrong calibration knows it."""
+    turn = generator.standard_normal(3) * error[1]
+    wrong = pose.copy()
+    wrong[:3, 3] += generator.standard_normal(3) * error[0]
+    axes = pose[:3, :3] + np.cross(turn, pose[:3, :3], axisb=0, axisc=0)
+    u, _, vt = np.linalg.svd(axes)
+    wrong[:3, :3] = u @ vt
+    return wrong
 
 
 @cache

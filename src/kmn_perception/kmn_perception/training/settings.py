@@ -23,6 +23,10 @@ class SensorSettings:
         the canonical camera's heading and above the ground.
     noise
         One of ``kmn_perception.sensor.NOISES``.
+    holes
+        Share of the samples with patches that were not measured.
+    pose_error
+        Standard deviations by which the believed pose of the camera is wrong: metres, radians.
     occlusion
         Share of the samples of which a random side is hidden, by up to 40 %.
     cut_height
@@ -34,6 +38,8 @@ class SensorSettings:
     azimuth: tuple[float, float]
     elevation: tuple[float, float]
     noise: str
+    holes: float
+    pose_error: tuple[float, float]
     occlusion: float
     cut_height: float
 
@@ -149,14 +155,20 @@ class StagewiseSettings:
 
 def _sensor(section: Section) -> SensorSettings:
     section.allow(
-        ("camera", "distance", "azimuth", "elevation", "noise", "occlusion", "cut_height")
-    )
+        (
+            "camera", "distance", "azimuth", "elevation", "noise", "holes", "pose_error",
+            "occlusion", "cut_height",
+        )
+    )  # fmt: skip
+    pose_error = section.numbers("pose_error", 2)
     return SensorSettings(
         camera=section.text("camera"),
         distance=section.limits("distance"),
         azimuth=section.limits("azimuth"),
         elevation=section.limits("elevation"),
         noise=section.text("noise", NOISES),
+        holes=section.number("holes", 0.0, 1.0),
+        pose_error=(pose_error[0], pose_error[1]),
         occlusion=section.number("occlusion", 0.0, 1.0),
         cut_height=section.number("cut_height", 0.0, 1.0),
     )

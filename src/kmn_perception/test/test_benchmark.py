@@ -20,9 +20,9 @@ from rclpy.node import Node
 from kmn_perception import weights
 from kmn_perception.benchmark import arguments, benchmark
 from kmn_perception.benchmark.scene import WALL_DISTANCE, full_cloud
+from kmn_perception.cascade import Cascade, CascadeSettings
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.messages import points_from_cloud
-from kmn_perception.network import MorphNetwork
 from kmn_perception.rendering import render
 from kmn_perception.transformation import transform_points
 
@@ -41,9 +41,8 @@ def environment() -> Iterator[dict[str, str]]:
 def parameters(tmp_path: Path) -> list[str]:
     """Return ROS arguments that name weights of the door with an untrained network."""
     path, door = tmp_path / "door.safetensors", KinematicModel.load("door")
-    kmn, baseline = (MorphNetwork(door, [2, 4, 8, 16, 32]) for _ in range(2))
-    known = {**weights.describe(door), "channels": kmn.channels}
-    weights.save(path, weights.Weights(kmn, baseline, known))
+    untrained = Cascade(door, CascadeSettings.load(), stages=2)
+    weights.save(path, weights.Weights(untrained, None, weights.describe(door)))
     return ["--ros-args", "-p", f"weights:={path}"]
 
 
@@ -75,8 +74,8 @@ def test_the_result_holds_every_stage_and_the_transport(
     result = json.loads(out.read_text())
     assert set(result) == {"stages", "transport"}
     assert list(result["stages"]) == [
-        "message_to_array", "background_removal", "splat", "network", "prediction_5_steps",
-        "callback",
+        "message_to_array", "background_removal", "splat", "network", "predictions",
+        "refinement", "refined_estimate", "callback",
     ]  # fmt: skip
     for times in result["stages"].values():
         assert set(times) == {"median_ms", "p95_ms"}

@@ -19,8 +19,9 @@ from kmn_perception.messages import (
 from kmn_perception.morph import predict
 from kmn_perception.node_parameters import NodeSettings
 from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.refinement import refine
 
-STEPS = 5  # predictions, as in the paper
+STEPS = 5  # predictions, as in the paper, or as many as the network makes
 Stage = Callable[[], object]
 
 
@@ -53,12 +54,15 @@ def chain(
         raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
     seen, first = [observation], network.start([observation])
     images = network.render_anew(0, seen, first)
+    predicted, _ = predict(network, seen, STEPS)
     return {
         "message_to_array": message_to_array,
         "background_removal": lambda: pipeline.observe(points),
-        "render_anew": lambda: network.render_anew(0, seen, first),
+        "splat": lambda: network.render_anew(0, seen, first),
         "network": lambda: network.predict(0, images),
-        "prediction_all_steps": lambda: predict(network, seen, STEPS),
+        "predictions": lambda: predict(network, seen, STEPS),
+        "refinement": lambda: refine(model, observation, predicted.values[0], estimator.refinement),
+        "refined_estimate": lambda: estimator.estimate(observation),
         "callback": callback,
     }, len(observation.points)
 

@@ -31,7 +31,7 @@ demo: build  ## estimate boxes on real Kinect clouds, through a bag and the node
 	@./run kmn_perception demo_bag
 
 .PHONY: test
-test: build lint  ## run the style checks and all tests
+test: build lint $(READY)simulation  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. install/setup.bash && .venv/bin/python -m pytest $(TESTS)
 
@@ -43,9 +43,10 @@ lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) an
 	@.venv/bin/mypy --no-error-summary
 	@for folder in tools $(TESTS); do .venv/bin/mypy --no-error-summary $$folder || exit; done
 
-.PHONY: setup-training setup-evaluation setup-test
+.PHONY: setup-training setup-evaluation setup-simulation setup-test
 setup-training: $(READY)training  ## install what the training needs
 setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
+setup-simulation: $(READY)simulation  ## install what the simulator needs (0.4 GB)
 setup-test: $(READY)test  ## install what the tests need
 
 .PHONY: clean

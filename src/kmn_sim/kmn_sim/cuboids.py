@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from kmn_sim.scenario import Scenario
 from kmn_sim.settings import BoxSettings, DoorSettings
 
-FLOOR_SIZE, FLOOR_THICKNESS = 40.0, 0.1  # metres
+FLOOR_SIZE, FLOOR_THICKNESS = 12.0, 0.1  # metres
 PANEL, HANDLE = (0.62, 0.46, 0.32, 1.0), (0.75, 0.75, 0.78, 1.0)  # colours
 FRAME, WALL, FLOOR = (0.45, 0.33, 0.24, 1.0), (0.86, 0.86, 0.83, 1.0), (0.55, 0.57, 0.6, 1.0)
 TABLE, CARTON = (0.6, 0.52, 0.42, 1.0), (0.72, 0.55, 0.36, 1.0)

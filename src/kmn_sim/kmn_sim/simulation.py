@@ -16,6 +16,7 @@ from kmn_sim.door import Door
 from kmn_sim.interpolation import State
 from kmn_sim.pr2_model import pr2_urdf
 from kmn_sim.pr2_settings import PR2Settings
+from kmn_sim.renderer import Renderer
 from kmn_sim.robot import Robot
 from kmn_sim.scenario import Scenario
 from kmn_sim.settings import BoxSettings, DoorSettings, PhysicsSettings
@@ -31,6 +32,8 @@ class Simulation:
         What stands in the world.
     gui
         Whether a window of the physics engine shows it.
+    renderer
+        What renders the camera's images: ``egl`` or ``software``.
     from_desired_state
         Whether a new trajectory starts from the desired state, else from the measured one.
 
@@ -42,16 +45,28 @@ class Simulation:
         The object, one of the two.
     physics
         Client of the physics engine.
+    renderer
+        Renders what cameras see of the world.
+    robot, controller, desired
+        The robot, what it follows, and the state that is desired of it in the last step.
+    floor
+        Height of the floor, metres.
     """
 
     def __init__(
-        self, scenario: Scenario, gui: bool = False, from_desired_state: bool = True
+        self,
+        scenario: Scenario,
+        gui: bool = False,
+        renderer: str = "egl",
+        from_desired_state: bool = True,
     ) -> None:
         self._settings = PhysicsSettings.load()
         self._door_settings, self._box_settings = DoorSettings.load(), BoxSettings.load()
         self._pr2_settings, self._urdf = PR2Settings.load(), pr2_urdf()
         self._from_desired_state = from_desired_state
         self.physics: Any = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
+        # Before there are bodies: a renderer does not know of those that were there before it.
+        self.renderer = Renderer(self.physics, renderer)
         self.step_time = 1.0 / self._settings.rate
         self._steps = 0
         self.build(scenario)
@@ -74,7 +89,6 @@ class Simulation:
         )
         self.door: Door | None = None
         self.carton: Carton | None = None
-        floor = 0.0
         if scenario.is_door:
             self.door = Door(physics, scenario, self._door_settings)
             base = self._door_settings.robot
@@ -83,8 +97,8 @@ class Simulation:
             base = self._box_settings.robot
         if scenario.table:
             self._stand(table_cuboids(self._box_settings))
-            floor = -self._box_settings.table_height
-        self.robot = Robot(physics, self._urdf, self._pr2_settings, base, floor)
+        self.floor = -self._box_settings.table_height if scenario.table else 0.0
+        self.robot = Robot(physics, self._urdf, self._pr2_settings, base, self.floor)
         if scenario.floor:
             ground = self._stand([floor_cuboid(scenario, self._box_settings)])
             # The robot's base moves in a plane: its wheels do not touch the ground.
@@ -131,6 +145,7 @@ class Simulation:
 
     def close(self) -> None:
         """End the physics engine."""
+        self.renderer.close()
         self.physics.disconnect()
 
     def _stand(self, cuboids: Sequence[Cuboid]) -> int:

@@ -18,4 +18,10 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            f"{name} = {PACKAGE}.executables:{name}"
+            for name in ("sim_node", "snapshot", "check_perception", "benchmark")
+        ],
+    },
 )

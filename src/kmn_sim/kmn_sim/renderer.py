@@ -54,7 +54,7 @@ class Renderer:
             self._physics.unloadPlugin(self._plugin)
             self._plugin = -1
 
-    def render(self, camera: Camera, shadow: bool = False) -> Picture:
+    def render(self, camera: Camera) -> Picture:
         """Return colours and depth of what a camera sees, exact but for the renderer's rounding."""
         hardware = self._plugin >= 0
         if hardware:  # its depth buffer has 16 bits only
@@ -67,7 +67,7 @@ class Renderer:
             camera.height,
             viewMatrix=(FLIP @ camera.world_to_camera).T.ravel().tolist(),
             projectionMatrix=_projection(camera).T.ravel().tolist(),
-            shadow=int(shadow),
+            shadow=0,
             lightDirection=LIGHT,
             renderer=(
                 pybullet.ER_BULLET_HARDWARE_OPENGL if hardware else pybullet.ER_TINY_RENDERER

@@ -1,0 +1,77 @@
+"""Films of a run: pictures of robot and object from beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from kmn_perception.camera import Camera, look_at
+from kmn_sim.simulation import Simulation
+
+FORMATS = (".gif", ".mp4")
+FOCAL = 0.8  # focal length in widths of the picture
+VIEWS = {  # position, and what is looked at; metres
+    True: ((-4.6, -3.0, 2.2), (-1.5, 0.0, 0.9)),  # a door
+    False: ((1.6, -2.3, 1.3), (-0.1, -0.6, 0.0)),  # a box
+}
+
+
+class Recorder:
+    """Takes pictures of a simulation and writes a film of them.
+
+    Parameters
+    ----------
+    file
+        Path with one of the endings ``FORMATS``.
+    rate
+        Pictures a second.
+    """
+
+    def __init__(self, file: Path, rate: float, width: int = 640, height: int = 480) -> None:
+        self._file, self._rate, self._size = file, rate, (width, height)
+        self._pictures: list[Image.Image] = []
+        self._video: cv2.VideoWriter | None = None
+        if file.suffix == ".mp4":
+            code = cv2.VideoWriter.fourcc(*"mp4v")
+            self._video = cv2.VideoWriter(str(file), code, rate, self._size)
+
+    def take(self, simulation: Simulation) -> None:
+        """Add a picture of the present."""
+        picture = snapshot(simulation, *self._size)
+        if self._video is not None:
+            self._video.write(np.ascontiguousarray(picture[..., ::-1]))
+        else:
+            self._pictures.append(Image.fromarray(picture).quantize(64))
+
+    def close(self) -> None:
+        """Write the film."""
+        if self._video is not None:
+            self._video.release()
+        elif self._pictures:
+            first, *others = self._pictures
+            first.save(
+                self._file,
+                save_all=True,
+                append_images=others,
+                duration=round(1e3 / self._rate),
+                loop=0,
+            )
+
+
+def snapshot(simulation: Simulation, width: int, height: int) -> NDArray[np.uint8]:
+    """Return a picture (height, width, 3) of robot and object, from beside them."""
+    position, target = VIEWS[simulation.scenario.is_door]
+    camera = Camera(
+        width,
+        height,
+        FOCAL * width,
+        FOCAL * width,
+        (width - 1) / 2.0,
+        (height - 1) / 2.0,
+        look_at(position, target),
+    )
+    return simulation.renderer.render(camera).colour

@@ -1,0 +1,163 @@
+"""Puts scenes before a running sim_node and takes what a running morph_node makes of them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import rclpy
+from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_sim.messages import seconds
+from kmn_sim.processes import NodeProcess, ProcessError
+
+START_TIMEOUT = 180.0  # seconds for both nodes to load and compile
+ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene
+POLL_PERIOD = 0.05  # seconds
+CAMERA_RATE = 4.0  # frames a second; morph_node shall not fall behind
+Found = TypeVar("Found")
+
+
+class Answer(NamedTuple):
+    """True and estimated morphing parameters (n + m,) of a scene, and how it went.
+
+    Attributes
+    ----------
+    status, reason
+        Of morph_node's message.
+    latency
+        Seconds from the exposure to the reception of the estimate.
+    """
+
+    truth: NDArray[np.float64]
+    estimate: NDArray[np.float64]
+    status: int
+    reason: str
+    latency: float
+
+
+class LiveScenes:
+    """A client of both nodes.
+
+    Parameters
+    ----------
+    node
+        In the namespace of the two.
+    processes
+        The two, which are watched.
+    """
+
+    def __init__(self, node: Node, processes: list[NodeProcess]) -> None:
+        self._processes = processes
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._node = node
+        self._estimates: list[tuple[MorphingParameters, float]] = []
+        self._truths: list[MorphingParameters] = []
+        node.create_subscription(MorphingParameters, "morphing_parameters", self._keep, 10)
+        node.create_subscription(MorphingParameters, "ground_truth", self._truths.append, 10)
+        self._setting = node.create_client(
+            SetParametersAtomically, "sim_node/set_parameters_atomically"
+        )
+        self._wait(lambda: self._setting.service_is_ready(), START_TIMEOUT, "sim_node")
+        self._wait(
+            lambda: node.count_publishers(f"{node.get_namespace()}/morphed_model"),
+            START_TIMEOUT,
+            "morph_node",
+        )
+
+    def show(self, values: NDArray[np.float64]) -> Answer:
+        """Set a scene of morphing parameters (n + m,) and return the estimate of it.
+
+        Raises
+        ------
+        ProcessError
+            If a node has ended, or there is no answer.
+        """
+        self._set(placement="given", values=[float(value) for value in values])
+        self._truths.clear()
+        self._estimates.clear()
+        estimate, received = self._wait(self._answered, ANSWER_TIMEOUT, "morph_node")
+        truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
+        return Answer(
+            np.array([*truth.theta, *truth.gamma]),
+            np.array([*estimate.theta, *estimate.gamma]),
+            int(estimate.status),
+            estimate.reason,
+            received - seconds(estimate.header.stamp),
+        )
+
+    def _keep(self, estimate: MorphingParameters) -> None:
+        self._estimates.append((estimate, time.time()))
+
+    def _answered(self) -> tuple[MorphingParameters, float] | None:
+        """Return an estimate of an exposure of the present scene."""
+        stamps = [truth.header.stamp for truth in self._truths]
+        return next((pair for pair in self._estimates if pair[0].header.stamp in stamps), None)
+
+    def _set(self, **values: Any) -> None:
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
+        )
+        future = self._setting.call_async(request)
+        self._wait(future.done, ANSWER_TIMEOUT, "sim_node")
+        result = future.result().result
+        if not result.successful:
+            raise ProcessError(f"sim_node refused the scene: {result.reason}")
+
+    def _wait(self, find: Callable[[], Found | None], timeout: float, whom: str) -> Found:
+        deadline = time.monotonic() + timeout
+        while not (found := find()):
+            for process in self._processes:
+                process.check()
+            if time.monotonic() > deadline:
+                raise ProcessError(f"{whom} did not answer within {timeout:g} s")
+            self._executor.spin_once(timeout_sec=POLL_PERIOD)
+        return found
+
+
+@contextmanager
+def live_scenes(model: KinematicModel, name: str, noise: str, seed: int) -> Iterator[LiveScenes]:
+    """Start both nodes in a namespace of their own, for the scenes of a model.
+
+    Parameters
+    ----------
+    name
+        The model's name or file.
+    noise, seed
+        Of the simulated sensor.
+    """
+    alone = f"__ns:=/sim_{os.getpid()}"  # whatever else runs here is not disturbed
+    sim: dict[str, Any] = {"model": name, "placement": "given", "values": [0.0] * len(model.parameters)}
+    sim |= {"noise": noise, "seed": seed, "camera_rate": CAMERA_RATE}
+    morph = {"model": name, "reliability": "reliable"}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        processes = [
+            stack.enter_context(
+                NodeProcess(module, [*_arguments(parameters), "-r", alone], folder / module)
+            )
+            for module, parameters in (
+                ("kmn_sim.start_sim_node", sim),
+                ("kmn_perception.start_morph_node", morph),
+            )
+        ]
+        node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])
+        stack.callback(node.destroy_node)
+        yield LiveScenes(node, processes)
+
+
+def _arguments(parameters: dict[str, Any]) -> list[str]:
+    return [text for name, value in parameters.items() for text in ("-p", f"{name}:={value}")]

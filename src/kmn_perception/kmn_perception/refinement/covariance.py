@@ -31,7 +31,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
             direction = directions[:, i] * half
             low, high = _segment(problem, fit, values, direction)
             values = values + 0.5 * (low + high) * direction
-            variances[i] = (high - low) ** 2 / 12.0
+            variances[i] = max((high - low) ** 2 / 12.0, problem.settings.limit_softness**2)
     scaled = directions * half[:, None]
     return values, scaled * variances @ scaled.T
 
@@ -39,11 +39,11 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
 def _segment(
     problem: Problem, fit: Fit, values: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Return how far one can go back and forth along a direction before something speaks against."""
+    """Return how far one can go back and forth along a direction before it is contradicted."""
     depth_information = direction @ fit.depth_information @ direction
 
     def loss(way: float) -> float:
-        edges = fine_edges(problem, problem.view(values + way * direction), fit.noise.lateral)
+        edges = fine_edges(problem, problem.view(values + way * direction), fit.noise)
         return edges.loss + 0.5 * depth_information * way**2
 
     allowed = loss(0.0) + problem.settings.segment_rise

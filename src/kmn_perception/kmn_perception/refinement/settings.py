@@ -7,7 +7,8 @@ from pathlib import Path
 
 from kmn_perception import resources
 from kmn_perception.configuration import Section
-from kmn_perception.refinement.edges import LARGEST_WINDOW, EdgeSettings
+from kmn_perception.refinement.edges import LARGEST_WINDOW
+from kmn_perception.refinement.silhouette import EdgeSettings
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,9 @@ class FineSettings:
     Attributes
     ----------
     steps
-        Largest number of steps.
+        Largest number of steps with few, and again with many pixels.
+    depth_pixels
+        Number of observed pixels whose depth is compared in the last steps.
     noise, least_noise
         Lateral noise at the start and at least, pixels.
     window, least_window
@@ -35,17 +38,22 @@ class FineSettings:
         Metres.
     robust
         Depths beyond this lose their weight, in units of their noise.
+    border
+        Pixels nearer than this to the rim of a face or image are left out, in units of the lateral
+        noise.
     tolerance
-        A smaller step is the last, pixels.
+        A smaller step is the last, in units of the lateral noise (but at least of 0.1 pixels).
     """
 
     steps: int
+    depth_pixels: int
     noise: float
     least_noise: float
     window: float
     least_window: float
     least_depth_noise: float
     robust: float
+    border: float
     tolerance: float
 
 
@@ -143,18 +151,20 @@ def _search(section: Section) -> SearchSettings:
 def _fine(section: Section) -> FineSettings:
     section.allow(
         (
-            "steps", "noise", "least_noise", "window", "least_window", "least_depth_noise",
-            "robust", "tolerance",
+            "steps", "depth_pixels", "noise", "least_noise", "window", "least_window", "least_depth_noise",
+            "robust", "border", "tolerance",
         )
     )  # fmt: skip
     return FineSettings(
         steps=section.whole_number("steps", 1, 1000),
+        depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
         noise=section.number("noise", 1e-6, LARGEST_WINDOW / 4),
         least_noise=section.number("least_noise", 1e-6, 1.0),
         window=section.number("window", 1.0, 10.0),
         least_window=section.number("least_window", 1.0, LARGEST_WINDOW),
         least_depth_noise=section.number("least_depth_noise", 1e-9, 1.0),
         robust=section.number("robust", 1.0, 100.0),
+        border=section.number("border", 0.0, 10.0),
         tolerance=section.number("tolerance", 0.0, 1.0),
     )
 

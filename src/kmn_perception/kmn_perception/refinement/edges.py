@@ -25,7 +25,7 @@ ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 FAR = 6.0  # standard deviations inside its own side, where a pixel says nothing more
 LOST = 0.25  # weight of a coarse sample without a step
 PHASES = 3.0  # an edge that crosses 1/3 of a pixel along its way averages where it cuts the rows
-VISIBLE = 0.1  # share of an edge's samples with a step, from which on it is in view
+VISIBLE = 0.5  # share of an edge's samples with a step, from which on it is in view
 
 
 class EdgeTerms(NamedTuple):
@@ -117,8 +117,9 @@ def _add_edge(
     rows = abs(line[0]) >= abs(line[1])
     along = 1 if rows else 0
     extent, width = inverse_depth.shape[1 - along], inverse_depth.shape[along]
-    first = max(0, math.ceil(min(ends[along], ends[2 + along]) + border))
-    last = min(extent - 1, math.floor(max(ends[along], ends[2 + along]) - border))
+    low, high = min(ends[along], ends[2 + along]), max(ends[along], ends[2 + along])
+    first = max(0, math.ceil(low + border))
+    last = min(extent - 1, math.floor(high - border))
     samples = max(last - first + 1, 1)
     sharpness = max(noise, 1.0 / samples)
     seen, found = 0, 0
@@ -139,7 +140,8 @@ def _add_edge(
         seen += 1
         if noise > 0.0:
             _add_probit(
-                line, start, step, a, rows, evidence[:count], sharpness, moment, force, sums
+                line, start, step, a, rows, evidence[:count], sharpness,
+                _taper(a, low + border, high - border, border), moment, force, sums,
             )  # fmt: skip
         behind = split(evidence[:count])
         has_step = 0 < behind < count
@@ -167,6 +169,12 @@ def _add_edge(
 
 
 @njit(cache=True, error_model="numpy")
+def _taper(a: int, low: float, high: float, border: float) -> float:
+    """Return a weight that rises from 0 at the ends of an edge, so that none of its samples jumps."""
+    return min(1.0, (a - low) / border, (high - a) / border) if border > 0.0 else 1.0
+
+
+@njit(cache=True, error_model="numpy")
 def _add_probit(
     line: NDArray[np.float64],
     start: int,
@@ -175,6 +183,7 @@ def _add_probit(
     rows: bool,
     evidence: NDArray[np.float64],
     noise: float,
+    weight: float,
     moment: NDArray[np.float64],
     force: NDArray[np.float64],
     sums: NDArray[np.float64],
@@ -191,12 +200,13 @@ def _add_probit(
             continue
         likely = 1.0 - sure + (2.0 * sure - 1.0) * 0.5 * math.erfc(-t * ROOT_HALF)
         density = (2.0 * sure - 1.0) * math.exp(-0.5 * t * t) / ROOT_TWO_PI
+        unlikely = 1.0 - likely
         push = density / likely
-        information = density * push / (1.0 - likely)
-        sums[0] -= math.log(likely)
-        sums[1] += t * push
-        sums[2] += t * t * information
-        _add(moment, force, information / noise**2, -sign * push / noise, u, v)
+        information = density * push / unlikely
+        sums[0] -= weight * math.log(likely)
+        sums[1] += weight * t * push
+        sums[2] += weight * t * t * information
+        _add(moment, force, weight * information / noise**2, -weight * sign * push / noise, u, v)
 
 
 @njit(cache=True, error_model="numpy")

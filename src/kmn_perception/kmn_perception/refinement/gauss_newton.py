@@ -94,7 +94,7 @@ def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fi
             planes = plane_terms(
                 view, problem.image, stride, *noise, settings.robust, settings.border * noise[1]
             )
-            edges = fine_edges(problem, view, noise)
+            edges = fine_edges(problem, view, noise, settings.border)
             step, moved = _step(problem, values, planes, edges)
             values = values + step / (1 + k // SWING)
             steps += 1
@@ -120,13 +120,18 @@ def _estimate_noise(
     return Noise(max(depth, least.depth), min(max(lateral, least.lateral), most))
 
 
-def fine_edges(problem: Problem, view: View, noise: Noise) -> EdgeTerms:
-    """Return the likelihood of the pixels beside the edges."""
+def fine_edges(problem: Problem, view: View, noise: Noise, border: float) -> EdgeTerms:
+    """Return the likelihood of the pixels beside the edges, but ``border`` s from their ends."""
     fine = problem.settings.fine
     window = max(fine.least_window, fine.window * noise.lateral)
-    border = fine.border * noise.lateral
     return edge_terms(
-        view, problem.image, problem.settings.edges, window, noise.lateral, noise.depth, border
+        view,
+        problem.image,
+        problem.settings.edges,
+        window,
+        noise.lateral,
+        noise.depth,
+        border * noise.lateral,
     )
 
 

@@ -14,7 +14,7 @@ LEAST_INFORMATION = 1e-12
 LEAST_COMPONENT = 1e-3  # of a direction, in half ranges; less does not run into a limit
 DOUBLINGS, BISECTIONS = 6, 8  # in the search for a segment's ends
 POINTS = 16  # of a segment
-PASSES = 2  # through several open directions
+PASSES = 3  # through several open directions
 
 
 class Segment(NamedTuple):
@@ -36,6 +36,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     eigenvalues, directions = np.linalg.eigh(information)
     variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
     is_open = variances > problem.settings.weak**2
+    directions[:, is_open] = _disentangled(directions[:, is_open])
     least = problem.settings.limit_softness**2
     values = fit.values
     for _ in range(PASSES if is_open.sum() > 1 else 1):
@@ -46,6 +47,27 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
             variances[i] = max(segment.variance, least)
     scaled = directions * half[:, None]
     return values, scaled * variances @ scaled.T
+
+
+def _disentangled(basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return another basis (P, K) of the same directions, each with a parameter of its own.
+
+    Each hidden end of an object is a direction, and any mixture of them is as open, but only along
+    the ends themselves does one not touch the bounds of another (Gauss-Jordan elimination).
+    """
+    basis = basis.copy()
+    own: list[int] = []
+    for k in range(basis.shape[1]):
+        free = np.abs(basis[:, k:])
+        free[own] = 0.0
+        parameter, column = np.unravel_index(np.argmax(free), free.shape)
+        basis[:, [k, k + column]] = basis[:, [k + column, k]]
+        own.append(int(parameter))
+        basis[:, k] /= basis[parameter, k]
+        for other in range(basis.shape[1]):
+            if other != k:
+                basis[:, other] -= basis[parameter, other] * basis[:, k]
+    return basis / np.linalg.norm(basis, axis=0)
 
 
 def _segment(

@@ -128,7 +128,7 @@ def _add_edge(
         u, v = (position, float(a)) if rows else (float(a), position)
         at_edge = plane[0] * u + plane[1] * v + plane[2]
         up = upwards[0] * u + upwards[1] * v + upwards[2]
-        if at_edge <= 0.0 or up / at_edge + upwards[3] < lowest:
+        if not image.farthest < at_edge < image.nearest or up / at_edge + upwards[3] < lowest:
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(

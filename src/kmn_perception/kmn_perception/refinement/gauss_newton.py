@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.capture import capture
 from kmn_perception.refinement.edges import EdgeTerms, edge_terms
 from kmn_perception.refinement.geometry import Shape, View, cuboids, view_of
 from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.misfit import misfit
 from kmn_perception.refinement.planes import PlaneTerms, plane_terms
-from kmn_perception.refinement.settings import RefinementSettings
+from kmn_perception.refinement.settings import RefinementSettings, SearchSettings
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations
@@ -66,19 +67,33 @@ class Fit(NamedTuple):
 
 def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     """Fit from a start: a coarse search that narrows, then down to the noise of the sensor."""
-    steps = 0
-    stride = problem.stride(problem.settings.depth_pixels)
-    for level in problem.settings.search:
-        noise = level.depth / COARSE * problem.steepness
-        for _ in range(level.steps):
-            view = problem.view(values)
-            planes = plane_terms(view, problem.image, stride, noise, 0.0, COARSE, 0.0)
-            edges = edge_terms(
-                view, problem.image, problem.settings.edges, level.window, 0.0, noise / COARSE, 0.0
-            )
-            values = values + _step(problem, values, planes, edges)[0]
-            steps += 1
+    search = problem.settings.search
+    for level in search:
+        values = _search(problem, values, level)
+    caught = capture(
+        problem.shape, problem.image, problem.limits, values, *problem.settings.capture
+    )
+    steps = sum(level.steps for level in search)
+    if caught is not values:
+        values = _search(problem, caught, search[-1])
+        steps += search[-1].steps
     return _fit_finely(problem, values, steps)
+
+
+def _search(
+    problem: Problem, values: NDArray[np.float64], level: SearchSettings
+) -> NDArray[np.float64]:
+    """Take the steps of one level of the coarse search."""
+    stride = problem.stride(problem.settings.depth_pixels)
+    noise = level.depth / COARSE * problem.steepness
+    for _ in range(level.steps):
+        view = problem.view(values)
+        planes = plane_terms(view, problem.image, stride, noise, 0.0, COARSE, 0.0)
+        edges = edge_terms(
+            view, problem.image, problem.settings.edges, level.window, 0.0, noise / COARSE, 0.0
+        )
+        values = values + _step(problem, values, planes, edges)[0]
+    return values
 
 
 def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fit:

@@ -12,6 +12,7 @@ from kmn_perception.observation import Observation
 from kmn_perception.refinement.geometry import projection
 
 HALF = 0.5
+LEAST_RANGE = 1e-6  # metres
 
 
 class Image(NamedTuple):
@@ -30,6 +31,8 @@ class Image(NamedTuple):
         upwards[3]``.
     floor
         Height in metres up to which points were lost.
+    nearest, farthest
+        Inverse depths between which the sensor measures, 1 / m.
     """
 
     inverse_depth: NDArray[np.float32]
@@ -37,6 +40,8 @@ class Image(NamedTuple):
     projection: NDArray[np.float64]
     upwards: NDArray[np.float64]
     floor: float
+    nearest: float
+    farthest: float
 
 
 def image_of(observation: Observation) -> Image:
@@ -47,7 +52,15 @@ def image_of(observation: Observation) -> Image:
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
-    return Image(inverse_depth, pixels, matrix, upwards, float(observation.floor))
+    return Image(
+        inverse_depth,
+        pixels,
+        matrix,
+        upwards,
+        float(observation.floor),
+        1.0 / max(camera.near, LEAST_RANGE),
+        1.0 / camera.far,
+    )
 
 
 @njit(cache=True)

@@ -14,7 +14,8 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
     """Return the share of pixels that the model explains wrongly.
 
     On a regular grid, a pixel that shows something where the model has nothing, or the other way
-    round, counts 1, and a wrong depth its square, up to 1; the sum is divided by the number of pixels seen.
+    round, counts 1, and a wrong depth its square, up to 1; the sum is divided by the number of
+    pixels seen. Where the model is out of the sensor's range, nothing need be seen.
 
     Parameters
     ----------
@@ -25,6 +26,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
     """
     solids, inverse_depth, pixels = view.solids, image.inverse_depth, image.pixels
     up, base, floor = image.upwards, image.upwards[3], image.floor
+    nearest, farthest = image.nearest, image.farthest
     height, width = inverse_depth.shape
     step = max(1, int(np.sqrt(pixels.shape[0] / count)))
     wrong, seen = 0.0, 0
@@ -36,10 +38,11 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
                 high = (up[0] * column + up[1] * row + up[2]) / predicted + base
                 if high < floor:
                     predicted = 0.0
+            measurable = farthest <= predicted <= nearest
             if observed > 0.0:
                 seen += 1
-            if observed > 0.0 and predicted > 0.0:
+            if observed > 0.0 and measurable:
                 wrong += min(1.0, ((1.0 / observed - 1.0 / predicted) / depth_scale) ** 2)
-            elif observed > 0.0 or predicted > 0.0:
+            elif observed > 0.0 or measurable:
                 wrong += 1.0
     return wrong / max(seen, 1)

@@ -75,7 +75,9 @@ def plane_terms(
     for i in range(0, pixels.shape[0], stride):
         u, v = float(pixels[i, 0]), float(pixels[i, 1])
         predicted, body, face = meet_any(solids, u, v)
-        if body < 0 or (border > 0.0 and _at_rim(solids, rims, body, face, u, v, predicted)):
+        if body < 0 or predicted > image.nearest or predicted < image.farthest:
+            continue
+        if border > 0.0 and _at_rim(solids, rims, body, face, u, v, predicted):
             continue
         residual = (pixels[i, 2] - predicted) / deviations[body, face]
         residuals[count] = residual

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from kmn_perception import resources
 from kmn_perception.configuration import Section
@@ -18,6 +19,13 @@ class SearchSettings:
     window: float
     depth: float
     steps: int
+
+
+class CaptureSettings(NamedTuple):
+    """The search for a lost body: size of the grid, and the support that is enough without it."""
+
+    tries: int
+    enough: float
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class RefinementSettings:
         Fewer points are not refined.
     depth_pixels
         Number of observed pixels whose depth is compared in one step.
-    search, fine, edges, misfit
+    search, capture, fine, edges, misfit
         Of the parts.
     starts
         From so many starts the model is fitted where there is no estimate.
@@ -104,6 +112,7 @@ class RefinementSettings:
     min_points: int
     depth_pixels: int
     search: tuple[SearchSettings, ...]
+    capture: CaptureSettings
     fine: FineSettings
     edges: EdgeSettings
     starts: int
@@ -120,7 +129,7 @@ class RefinementSettings:
         section = Section.load(file)
         section.allow(
             (
-                "min_points", "depth_pixels", "search", "fine", "edges", "starts", "damping",
+                "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts", "damping",
                 "limit_softness", "misfit", "weak", "segment_rise",
             )
         )  # fmt: skip
@@ -128,6 +137,7 @@ class RefinementSettings:
             min_points=section.whole_number("min_points", 1, 10**6),
             depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
             search=tuple(_search(entry) for entry in section.sections("search")),
+            capture=_capture(section.section("capture")),
             fine=_fine(section.section("fine")),
             edges=_edges(section.section("edges")),
             starts=section.whole_number("starts", 1, 100),
@@ -145,6 +155,13 @@ def _search(section: Section) -> SearchSettings:
         section.number("window", 1.0, LARGEST_WINDOW),
         section.number("depth", 1e-6, 1e3),
         section.whole_number("steps", 0, 100),
+    )
+
+
+def _capture(section: Section) -> CaptureSettings:
+    section.allow(("tries", "enough"))
+    return CaptureSettings(
+        section.whole_number("tries", 1, 10**5), section.number("enough", -1.0, 1.0)
     )
 
 

@@ -20,7 +20,7 @@ def capture(
     tries: int,
     enough: float,
 ) -> NDArray[np.float64]:
-    """Return the values (P,), with bodies that are not seen where they should be moved to a better place.
+    """Return the values (P,), with bodies that are not seen in their places moved to better ones.
 
     Only parameters that move no other body are changed, on a grid over their limits.
 
@@ -36,7 +36,7 @@ def capture(
         if not own or best >= enough:
             continue
         start, count = values, max(2, int(tries ** (1.0 / len(own))))
-        axes = [np.linspace(*limits[i], count) for i in own]
+        axes = [np.linspace(limits[i, 0], limits[i, 1], count) for i in own]
         for place in itertools.product(*axes):
             candidate = start.copy()
             candidate[own] = place

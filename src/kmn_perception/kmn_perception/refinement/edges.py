@@ -170,7 +170,7 @@ def _add_edge(
 
 @njit(cache=True, error_model="numpy")
 def _taper(a: int, low: float, high: float, border: float) -> float:
-    """Return a weight that rises from 0 at the ends of an edge, so that none of its samples jumps."""
+    """Return a weight that rises from 0 at the ends of an edge, so that no sample jumps."""
     return min(1.0, (a - low) / border, (high - a) / border) if border > 0.0 else 1.0
 
 

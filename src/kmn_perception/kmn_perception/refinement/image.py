@@ -70,7 +70,7 @@ def _splat(
     matrix: NDArray[np.float64],
     near: float,
 ) -> NDArray[np.float32]:
-    """Keep the nearest point of each pixel; return the pixels that were hit, in the points' order."""
+    """Keep the nearest point of each pixel; return the pixels hit, in the points' order."""
     height, width = inverse_depth.shape
     pixels = np.empty((points.shape[0], 3), dtype=np.float32)
     count = 0

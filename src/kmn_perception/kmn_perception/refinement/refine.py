@@ -1,4 +1,4 @@
-"""The best fit of a kinematic model to an observation, from the network's estimate or without it."""
+"""The best fit of a model to an observation, from the network's estimate or without it."""
 
 from __future__ import annotations
 
@@ -151,5 +151,5 @@ def _turned(model: KinematicModel, values: NDArray[np.float64]) -> list[NDArray[
         return [values]
     yaw = model.transformation.kinds.index(("rotation", "z"))
     starts = np.repeat(values[None], YAWS, axis=0)
-    starts[:, yaw] = np.linspace(*model.limits[yaw], YAWS)
+    starts[:, yaw] = np.linspace(model.limits[yaw, 0], model.limits[yaw, 1], YAWS)
     return list(starts)

@@ -129,8 +129,8 @@ class RefinementSettings:
         section = Section.load(file)
         section.allow(
             (
-                "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts", "damping",
-                "limit_softness", "misfit", "weak", "segment_rise",
+                "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts",
+                "damping", "limit_softness", "misfit", "weak", "segment_rise",
             )
         )  # fmt: skip
         return cls(
@@ -168,8 +168,8 @@ def _capture(section: Section) -> CaptureSettings:
 def _fine(section: Section) -> FineSettings:
     section.allow(
         (
-            "steps", "depth_pixels", "noise", "least_noise", "window", "least_window", "least_depth_noise",
-            "robust", "border", "tolerance",
+            "steps", "depth_pixels", "noise", "least_noise", "window", "least_window",
+            "least_depth_noise", "robust", "border", "tolerance",
         )
     )  # fmt: skip
     return FineSettings(

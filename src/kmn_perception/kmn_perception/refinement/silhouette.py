@@ -66,8 +66,8 @@ def scan(
     window, chord
         How far to look to either side, and how far inside at most, in pixels.
     evidence
-        Is filled in: positive where the body is seen, negative where something behind it is, 0 where
-        neither is known. Its amount is the probability that this is right.
+        Is filled in: positive where the body is seen, negative where something behind it is, 0
+        where neither is known. Its amount is the probability that this is right.
 
     Returns
     -------

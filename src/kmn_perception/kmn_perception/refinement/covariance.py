@@ -60,9 +60,9 @@ def _disentangled(basis: NDArray[np.float64]) -> NDArray[np.float64]:
     for k in range(basis.shape[1]):
         free = np.abs(basis[:, k:])
         free[own] = 0.0
-        parameter, column = np.unravel_index(np.argmax(free), free.shape)
+        parameter, column = divmod(int(np.argmax(free)), free.shape[1])
         basis[:, [k, k + column]] = basis[:, [k + column, k]]
-        own.append(int(parameter))
+        own.append(parameter)
         basis[:, k] /= basis[parameter, k]
         for other in range(basis.shape[1]):
             if other != k:
@@ -78,7 +78,7 @@ def _segment(
     Pixels far from the edges that are explained wrongly count as well. The edges count up to their
     ends, so that the pixels that count do not change with them.
     """
-    depth_information = direction @ fit.depth_information @ direction
+    depth_information = float(direction @ fit.depth_information @ direction)
 
     pixels = min(len(problem.image.pixels), problem.settings.misfit.pixels)
 

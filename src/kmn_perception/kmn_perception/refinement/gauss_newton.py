@@ -92,7 +92,7 @@ def _search(
         edges = edge_terms(
             view, problem.image, problem.settings.edges, level.window, 0.0, noise / COARSE, 0.0
         )
-        values = values + _step(problem, values, planes, edges)[0]
+        values = _kept(problem, values + _step(problem, values, planes, edges)[0])
     return values
 
 
@@ -111,7 +111,7 @@ def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fi
             )
             edges = fine_edges(problem, view, noise, settings.border)
             step, moved = _step(problem, values, planes, edges)
-            values = values + step / (1 + k // SWING)
+            values = _kept(problem, values + step / (1 + k // SWING))
             steps += 1
             before = noise
             noise = _estimate_noise(noise, least, planes, edges, settings.noise)
@@ -169,6 +169,13 @@ def _step(
     scale = 1.0 / np.sqrt(np.diag(damped))
     step = -scale * np.linalg.solve(damped * np.outer(scale, scale), scale * gradient)
     return step, float(np.abs(step * pixels).max())
+
+
+def _kept(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Keep values within the limits, and a margin beside them."""
+    low, high = problem.limits.T
+    margin = problem.settings.limit_margin * (high - low)
+    return np.clip(values, low - margin, high + margin)
 
 
 def pixels_per_unit(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,9 @@ from numba import njit
 from kmn_perception.refinement.geometry import View, meet_any
 from kmn_perception.refinement.image import Image
 
+DIGITS = 6  # of the share; less is the rounding of the points
+MOST = 15  # times the number of pixels asked for are looked at
+
 
 @njit(cache=True, error_model="numpy")
 def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
@@ -28,7 +31,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
     up, base, floor = image.upwards, image.upwards[3], image.floor
     nearest, farthest = image.nearest, image.farthest
     height, width = inverse_depth.shape
-    step = max(1, int(np.sqrt(pixels.shape[0] / count)))
+    step = max(1, int(np.sqrt(max(pixels.shape[0] / count, height * width / (MOST * count)))))
     wrong, seen = 0.0, 0
     for row in range(step // 2, height, step):
         for column in range(step // 2, width, step):
@@ -45,4 +48,4 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
                 wrong += min(1.0, ((1.0 / observed - 1.0 / predicted) / depth_scale) ** 2)
             elif observed > 0.0 or measurable:
                 wrong += 1.0
-    return wrong / max(seen, 1)
+    return round(wrong / max(seen, 1), DIGITS)

@@ -17,6 +17,7 @@ from kmn_perception.refinement.settings import RefinementSettings
 
 SCAN = 9  # values of each parameter that are tried, within its limits
 YAWS = 9
+AT_THE_FIT = 10.0  # squared distance for each parameter, at which a start is as good as the fit
 
 
 class Refinement(NamedTuple):
@@ -31,7 +32,8 @@ class Refinement(NamedTuple):
     iterations
         Steps that were taken.
     improved
-        The misfit is not larger than that of the start; else the start is returned.
+        The misfit is not larger than that of the start. Else the start is returned, with the fit's
+        covariance where the start agrees with the fit, and with that of the limits where not.
     reason
         Why the result is not to be trusted; empty when it is fine.
     """
@@ -99,13 +101,17 @@ def _refined(
                 best, misfit = candidate, candidate_misfit
     values, covariance = with_covariance(problem, best)
     misfit, before = problem.misfit(values), problem.misfit(start)
-    if not misfit <= before:
-        reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
-        return _unrefined(model, start, before, iterations, reason)
+    improved = misfit <= before
+    if not improved:
+        error = start - values
+        if error @ np.linalg.pinv(covariance, hermitian=True) @ error > AT_THE_FIT * len(error):
+            reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
+            return _unrefined(model, start, before, iterations, reason)
+        values, misfit = start, before
     reason = ""
     if misfit > settings.wrong:
         reason = f"the model explains {misfit:.0%} of the observation wrongly"
-    return Refinement(values, covariance, misfit, iterations, True, reason)
+    return Refinement(values, covariance, misfit, iterations, improved, reason)
 
 
 def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit, float]:

@@ -101,6 +101,8 @@ class RefinementSettings:
         From so many starts the model is fitted where there is no estimate.
     damping
         Information that every squared pixel of movement is taken to cost.
+    limit_margin
+        By how much of its range a parameter may lie beyond its limits.
     limit_softness
         Standard deviation beyond the limits, as a share of half the range.
     weak
@@ -117,6 +119,7 @@ class RefinementSettings:
     edges: EdgeSettings
     starts: int
     damping: float
+    limit_margin: float
     limit_softness: float
     misfit: MisfitSettings
     weak: float
@@ -130,7 +133,7 @@ class RefinementSettings:
         section.allow(
             (
                 "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts",
-                "damping", "limit_softness", "misfit", "weak", "segment_rise",
+                "damping", "limit_margin", "limit_softness", "misfit", "weak", "segment_rise",
             )
         )  # fmt: skip
         return cls(
@@ -142,6 +145,7 @@ class RefinementSettings:
             edges=_edges(section.section("edges")),
             starts=section.whole_number("starts", 1, 100),
             damping=section.number("damping", 0.0, 1e6),
+            limit_margin=section.number("limit_margin", 0.0, 10.0),
             limit_softness=section.number("limit_softness", 1e-6, 1.0),
             misfit=_misfit(section.section("misfit")),
             weak=section.number("weak", 0.0, 1.0),

@@ -15,9 +15,7 @@ from kmn_perception.configuration import ConfigurationError
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation
 from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch
-from kmn_perception.refinement.gauss_newton import Problem
-from kmn_perception.refinement.geometry import shape_of
-from kmn_perception.refinement.image import image_of
+from kmn_perception.refinement.problem import Problem
 from kmn_perception.training.samples import EVALUATION, observe, sample
 
 Vector = NDArray[np.float64]
@@ -112,8 +110,7 @@ def test_no_start_is_needed(name: str) -> None:
 
 def misfit_of(model: KinematicModel, observation: Observation, values: Vector) -> float:
     """Return the common misfit of values that are not refined."""
-    problem = Problem(shape_of(model), model.limits, image_of(observation), SETTINGS)
-    return problem.misfit(values)
+    return Problem.of(model, observation, SETTINGS).misfit(values)
 
 
 def nonsense(case: str) -> tuple[KinematicModel, Observation, Vector]:

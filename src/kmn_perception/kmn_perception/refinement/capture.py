@@ -32,8 +32,10 @@ def capture(
         A body is in its place when its support is at least this.
     """
     for b, own in enumerate(_own_parameters(shape, values)):
+        if not own:
+            continue
         best = support(view_of(shape, values, image.projection), image, b)
-        if not own or best >= enough:
+        if best >= enough:
             continue
         start, count = values, max(2, int(tries ** (1.0 / len(own))))
         axes = [np.linspace(limits[i, 0], limits[i, 1], count) for i in own]

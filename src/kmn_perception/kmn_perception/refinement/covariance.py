@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.gauss_newton import Fit, Problem, fine_edges
+from kmn_perception.refinement.gauss_newton import Fit, fine_edges
+from kmn_perception.refinement.problem import Problem
 
 LEAST_INFORMATION = 1e-12
 LEAST_COMPONENT = 1e-3  # of a direction, in half ranges; less does not run into a limit
-DOUBLINGS, BISECTIONS = 6, 8  # in the search for a segment's ends
-POINTS = 16  # of a segment
+DOUBLINGS, BISECTIONS = 4, 7  # in the search for a segment's ends
+POINTS = 12  # of a segment
 PASSES = 3  # through several open directions
 
 
@@ -31,7 +32,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     hardly shows, all values within the limits are equally likely beforehand, and the estimate is
     the median of what the edges leave of them.
     """
-    half = np.ptp(problem.limits, axis=1) / 2.0
+    half = problem.half_range
     information = (fit.depth_information + fit.edge_information) * np.outer(half, half)
     eigenvalues, directions = np.linalg.eigh(information)
     variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
@@ -126,7 +127,7 @@ def _within_limits(
     problem: Problem, values: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> tuple[float, float]:
     """Return the least and greatest multiple of a direction that keeps the limits."""
-    half = np.ptp(problem.limits, axis=1) / 2.0
+    half = problem.half_range
     moved = np.abs(direction) > LEAST_COMPONENT * half
     ways = (problem.limits[moved] - values[moved, None]) / direction[moved, None]
     return min(0.0, ways.min(axis=1).max()), max(0.0, ways.max(axis=1).min())

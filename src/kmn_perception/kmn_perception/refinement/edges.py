@@ -60,6 +60,7 @@ def edge_terms(
     noise: float,
     depth_noise: float,
     border: float,
+    most: int,
 ) -> EdgeTerms:
     """Compare the pixels within ``window`` pixels of each silhouette edge with the edge.
 
@@ -72,6 +73,8 @@ def edge_terms(
         Of the inverse depth, 1 / m.
     border
         Samples nearer than this to the ends of an edge are left out, pixels.
+    most
+        At most about so many samples are taken of each edge.
     """
     parameters = view.line_slopes.shape[3]
     hessian, gradient = np.zeros((parameters, parameters)), np.zeros(parameters)
@@ -82,7 +85,7 @@ def edge_terms(
             if view.faces[b, edge] >= 0:
                 moment, force = np.zeros((3, 3)), np.zeros(3)
                 visible = _add_edge(
-                    view, image, settings, window, noise, depth_noise, border, b, edge,
+                    view, image, settings, window, noise, depth_noise, border, most, b, edge,
                     moment, force, sums,
                 )  # fmt: skip
                 slopes = view.line_slopes[b, edge]
@@ -101,6 +104,7 @@ def _add_edge(
     noise: float,
     depth_noise: float,
     border: float,
+    most: int,
     b: int,
     edge: int,
     moment: NDArray[np.float64],
@@ -123,7 +127,7 @@ def _add_edge(
     samples = max(last - first + 1, 1)
     sharpness = max(noise, 1.0 / samples)
     seen, found = 0, 0
-    for a in range(first, last + 1):
+    for a in range(first, last + 1, 1 + samples // most):
         position = -(line[along] * a + line[2]) / line[1 - along]
         u, v = (position, float(a)) if rows else (float(a), position)
         at_edge = plane[0] * u + plane[1] * v + plane[2]

@@ -9,43 +9,16 @@ from numpy.typing import NDArray
 
 from kmn_perception.refinement.capture import capture
 from kmn_perception.refinement.edges import EdgeTerms, edge_terms
-from kmn_perception.refinement.geometry import Shape, View, cuboids, view_of
-from kmn_perception.refinement.image import Image
-from kmn_perception.refinement.misfit import misfit
+from kmn_perception.refinement.geometry import View
 from kmn_perception.refinement.planes import PlaneTerms, plane_terms
-from kmn_perception.refinement.settings import RefinementSettings, SearchSettings
+from kmn_perception.refinement.problem import Problem
+from kmn_perception.refinement.settings import SearchSettings
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations
+ALL = 10**6  # samples of an edge
 SWING = 6  # after as many steps they are halved, lest they swing to and fro
 TENTH = 0.1  # pixels, and of the noise: what is less has settled
-
-
-class Problem(NamedTuple):
-    """What is fitted to what."""
-
-    shape: Shape
-    limits: NDArray[np.float64]  # (P, 2)
-    image: Image
-    settings: RefinementSettings
-
-    def view(self, values: NDArray[np.float64]) -> View:
-        """Return the model as the sensor sees it."""
-        return view_of(self.shape, values, self.image.projection)
-
-    def misfit(self, values: NDArray[np.float64]) -> float:
-        """Return the share of pixels that the model at ``values`` explains wrongly."""
-        settings = self.settings.misfit
-        return misfit(self.view(values), self.image, settings.pixels, settings.depth)
-
-    def stride(self, pixels: int) -> int:
-        """Return which of the observed pixels to take, so that there are about so many."""
-        return max(1, round(len(self.image.pixels) / pixels))
-
-    @property
-    def steepness(self) -> float:
-        """Inverse depth per metre at the object's distance, 1 / m^2."""
-        return float(np.mean(self.image.pixels[:: self.stride(1000), 2])) ** 2
 
 
 class Noise(NamedTuple):
@@ -90,9 +63,16 @@ def _search(
         view = problem.view(values)
         planes = plane_terms(view, problem.image, stride, noise, 0.0, COARSE, 0.0)
         edges = edge_terms(
-            view, problem.image, problem.settings.edges, level.window, 0.0, noise / COARSE, 0.0
+            view,
+            problem.image,
+            problem.settings.edges,
+            level.window,
+            0.0,
+            noise / COARSE,
+            0.0,
+            level.samples,
         )
-        values = _kept(problem, values + _step(problem, values, planes, edges)[0])
+        values = problem.kept(values + _step(problem, values, planes, edges)[0])
     return values
 
 
@@ -111,7 +91,7 @@ def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fi
             )
             edges = fine_edges(problem, view, noise, settings.border)
             step, moved = _step(problem, values, planes, edges)
-            values = _kept(problem, values + step / (1 + k // SWING))
+            values = problem.kept(values + step / (1 + k // SWING))
             steps += 1
             before = noise
             noise = _estimate_noise(noise, least, planes, edges, settings.noise)
@@ -147,6 +127,7 @@ def fine_edges(problem: Problem, view: View, noise: Noise, border: float) -> Edg
         noise.lateral,
         noise.depth,
         border * noise.lateral,
+        ALL,
     )
 
 
@@ -159,28 +140,13 @@ def _step(
     """Return a damped step, and by how many pixels it moves the object."""
     hessian = planes.hessian + edges.hessian
     gradient = planes.gradient + edges.gradient
-    centre, half = problem.limits.mean(axis=1), np.ptp(problem.limits, axis=1) / 2.0
-    softness = problem.settings.limit_softness * half
-    beyond = values - np.clip(values, centre - half, centre + half)
-    hessian = hessian + np.diag((beyond != 0.0) / softness**2)
-    gradient = gradient + beyond / softness**2
-    pixels = pixels_per_unit(problem, values)
-    damped = hessian + problem.settings.damping * np.diag(pixels**2)
+    low, high = problem.limits.T
+    softness = problem.settings.limit_softness * problem.half_range
+    beyond = values - np.minimum(np.maximum(values, low), high)
+    pixels = problem.pixels_per_unit(values)
+    damping = (beyond != 0.0) / softness**2 + problem.settings.damping * pixels**2
+    damped = hessian + np.diag(damping)
+    gradient += beyond / softness**2
     scale = 1.0 / np.sqrt(np.diag(damped))
     step = -scale * np.linalg.solve(damped * np.outer(scale, scale), scale * gradient)
     return step, float(np.abs(step * pixels).max())
-
-
-def _kept(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Keep values within the limits, and a margin beside them."""
-    low, high = problem.limits.T
-    margin = problem.settings.limit_margin * (high - low)
-    return np.clip(values, low - margin, high + margin)
-
-
-def pixels_per_unit(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return by about how many pixels each parameter (P,) moves the object's surface."""
-    _, slopes = cuboids(problem.shape, values)
-    corners = 0.25 * (slopes[:, :, :3] ** 2).sum(axis=(1, 2)) + (slopes[:, :, 3] ** 2).sum(axis=1)
-    focal_length = np.linalg.norm(problem.image.projection[0, :3])
-    return np.sqrt(corners.max(axis=0) * problem.steepness) * focal_length + 1e-12

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation
 from kmn_perception.refinement.covariance import with_covariance
-from kmn_perception.refinement.gauss_newton import Fit, Problem, fit
-from kmn_perception.refinement.geometry import shape_of
-from kmn_perception.refinement.image import image_of
+from kmn_perception.refinement.gauss_newton import Fit, fit
+from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.settings import RefinementSettings
 
 SCAN = 9  # values of each parameter that are tried, within its limits
@@ -56,7 +55,7 @@ def refine(
 
     The result is never worse than the start by the common misfit.
     """
-    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    problem = Problem.of(model, observation, settings)
     values = np.asarray(values, dtype=np.float64)
     count = len(problem.image.pixels)
     if count < settings.min_points:
@@ -71,7 +70,7 @@ def refine_from_scratch(
     model: KinematicModel, observation: Observation, settings: RefinementSettings
 ) -> Refinement:
     """Fit (theta, gamma) to an observation without any estimate: from several starts."""
-    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    problem = Problem.of(model, observation, settings)
     start = _above_centroid(model, observation)
     count = len(problem.image.pixels)
     if count < settings.min_points:
@@ -99,7 +98,10 @@ def _refined(
             iterations += candidate.steps
             if candidate_misfit < misfit:
                 best, misfit = candidate, candidate_misfit
-    values, covariance = with_covariance(problem, best)
+    if misfit > settings.wrong:
+        values, covariance = best.values, _within_limits(model)
+    else:
+        values, covariance = with_covariance(problem, best)
     misfit, before = problem.misfit(values), problem.misfit(start)
     improved = misfit <= before
     if not improved:
@@ -122,9 +124,13 @@ def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit
 def _unrefined(
     model: KinematicModel, values: NDArray[np.float64], misfit: float, iterations: int, reason: str
 ) -> Refinement:
-    """Return the start; where it lies within the limits is not known."""
-    covariance = np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
-    return Refinement(values, covariance, misfit, iterations, False, reason)
+    """Return the start."""
+    return Refinement(values, _within_limits(model), misfit, iterations, False, reason)
+
+
+def _within_limits(model: KinematicModel) -> NDArray[np.float64]:
+    """Return the covariance (P, P) of values of which no more is known than the limits."""
+    return np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
 
 
 def _scan(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:

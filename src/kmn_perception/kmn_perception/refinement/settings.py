@@ -14,11 +14,24 @@ from kmn_perception.refinement.silhouette import EdgeSettings
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """A level of the coarse search: window in pixels, robust depth in metres, number of steps."""
+    """A level of the coarse search.
+
+    Attributes
+    ----------
+    window
+        Pixels to either side in which an edge is sought.
+    depth
+        Larger differences in depth are ignored, metres.
+    steps
+        Of Gauss-Newton.
+    samples
+        Of each edge.
+    """
 
     window: float
     depth: float
     steps: int
+    samples: int
 
 
 class CaptureSettings(NamedTuple):
@@ -154,11 +167,12 @@ class RefinementSettings:
 
 
 def _search(section: Section) -> SearchSettings:
-    section.allow(("window", "depth", "steps"))
+    section.allow(("window", "depth", "steps", "samples"))
     return SearchSettings(
         section.number("window", 1.0, LARGEST_WINDOW),
         section.number("depth", 1e-6, 1e3),
         section.whole_number("steps", 0, 100),
+        section.whole_number("samples", 1, 10**6),
     )
 
 

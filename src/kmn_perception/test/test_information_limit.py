@@ -89,10 +89,10 @@ def test_the_best_estimate_looks_like_the_truth_and_lies_within_the_limits(name:
         observation, truth = sample(model, 5, index, spawn_key=EVALUATION)
         best = best_estimate(model, observation.camera, truth)
         assert (model.limits[:, 0] <= best).all() and (best <= model.limits[:, 1]).all()
-        images = [
+        true_image, image = (
             render(model.unit_cubes(*model.split(values)), observation.camera)
             for values in (truth, best)
-        ]
-        np.testing.assert_allclose(*images, atol=1e-5)
+        )
+        np.testing.assert_allclose(image, true_image, atol=1e-5)
         opened += not np.array_equal(best, truth)
     assert 0 < opened < 20

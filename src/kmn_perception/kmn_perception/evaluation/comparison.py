@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kmn_perception.evaluation.coverage import is_covered
 from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.information_limit import best_estimate
-from kmn_perception.evaluation.methods import METHODS, PEERS, Estimate, Method, choose
+from kmn_perception.evaluation.methods import METHODS, PEERS, Estimate, Method, MethodError, choose
 from kmn_perception.evaluation.networks import Networks, load_networks
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
@@ -41,6 +41,8 @@ class Request:
         Of the samples; without noise they are seen as in training.
     methods
         Names; ``None``: all for which the model has weights, the peers on fewer samples.
+    lenient
+        Leave out named methods for which the model has no weights.
     weights, paper_weights
         Files for our network and for the paper's; ``None``: the shipped ones.
     """
@@ -49,6 +51,7 @@ class Request:
     seed: int
     noise: str | None = None
     methods: tuple[str, ...] | None = None
+    lenient: bool = False
     weights: str | None = None
     paper_weights: str | None = None
 
@@ -74,14 +77,23 @@ class Comparison:
         By method, the number of the step whose estimate is the result.
     left_out
         By method, why it is not compared.
+
+    Raises
+    ------
+    MethodError
+        If a method that was named lacks something.
     """
 
     def __init__(self, request: Request, settings: EvaluationSettings) -> None:
         self.model = KinematicModel.load(request.model)
         self.networks = load_networks(self.model, request.weights, request.paper_weights)
-        names = request.methods and tuple(name for name in request.methods if name != LIMIT)
-        self._methods, self.left_out = choose(names, self.model, self.networks, settings)
-        self._limit = request.methods is None or LIMIT in request.methods
+        names = NAMES if request.methods is None else request.methods
+        self._methods, self.left_out = choose(
+            [name for name in names if name != LIMIT], self.model, self.networks, settings
+        )
+        if self.left_out and request.methods is not None and not request.lenient:
+            raise MethodError("; ".join(f"{name}: {why}" for name, why in self.left_out.items()))
+        self._limit = LIMIT in names
         self._request, self._settings = request, settings
         self._sensor, self.noise = sensor_of(self.networks, request.noise)
         self.counted = {name: method.counted for name, method in self._methods.items()}

@@ -56,7 +56,12 @@ def evaluate(
         for name, counted in comparison.counted.items()
     }
     name = comparison.model.name
-    with tqdm(total=samples, desc=f"evaluate {name}", unit=" samples", mininterval=1.0) as bar:
+    with tqdm(
+        total=samples,
+        desc=f"evaluate {name} ({comparison.noise})",
+        unit=" samples",
+        mininterval=1.0,
+    ) as bar:
         for visible, measured in measurements(comparison, request, settings, samples, jobs):
             for method, measurement in measured.items():
                 tallies[method].add(visible, measurement)
@@ -67,10 +72,25 @@ def evaluate(
         "seed": request.seed,
         "noise": comparison.noise,
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "command": command(request, samples),
         "weights": comparison.networks.hashes,
         "configuration": configuration_hash(request.model),
         "methods": {method: tally.summary() for method, tally in tallies.items()},
     }
+
+
+def command(request: Request, samples: int) -> str:
+    """Return the command that evaluates as requested."""
+    words = ["--model", request.model, "--samples", str(samples), "--seed", str(request.seed)]
+    for option, value in (
+        ("--noise", request.noise),
+        ("--weights", request.weights),
+        ("--paper-weights", request.paper_weights),
+    ):
+        words += [option, value] if value else []
+    if request.methods is not None:
+        words += ["--methods", *request.methods]
+    return f"./run kmn_perception evaluate {shlex.join(words)}"
 
 
 def configuration_hash(model: str) -> str:
@@ -86,7 +106,6 @@ def configuration_hash(model: str) -> str:
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the executable."""
     options = arguments(argv)
-    words = sys.argv[1:] if argv is None else argv
     try:
         settings = EvaluationSettings.load()
         request = Request(
@@ -98,7 +117,6 @@ def main(argv: Sequence[str] | None = None) -> None:
             paper_weights=options.paper_weights,
         )
         result = evaluate(request, options.samples, options.jobs, settings)
-        result["command"] = f"./run kmn_perception evaluate {shlex.join(words)}"
         print(report(result, settings.paper.get(result["model"], {})))
         if options.json:
             options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -144,30 +144,17 @@ PEERS = ("multistart", "icp", "icp_identity", "icp_plane", "small_gicp")
 
 
 def choose(
-    names: tuple[str, ...] | None,
+    names: Sequence[str],
     model: KinematicModel,
     networks: Networks,
     settings: EvaluationSettings,
 ) -> tuple[dict[str, Method], dict[str, str]]:
-    """Return the methods of these names, without names all for which the model has what they need.
-
-    Returns
-    -------
-    methods, left_out
-        The methods by name, and the reason why others are left out.
-
-    Raises
-    ------
-    MethodError
-        If a method that was named lacks something.
-    """
+    """Return methods by name; of those that lack something, the reason by name."""
     chosen, left_out = {}, {}
-    for name in METHODS if names is None else names:
+    for name in names:
         try:
             chosen[name] = METHODS[name](model, networks, settings)
         except MethodError as error:
-            if names is not None:
-                raise MethodError(f"{name}: {error}") from error
             left_out[name] = str(error)
     return chosen, left_out
 

@@ -8,6 +8,7 @@ from kmn_perception.columns import columns
 from kmn_perception.evaluation.settings import PaperFigures
 
 NONE = "-"
+FEW_DIGITS = 1e-4  # smaller errors are written with an exponent
 
 PAPER_METHOD = {
     "baseline": "baseline",
@@ -40,7 +41,7 @@ def report(result: dict[str, Any], paper: PaperFigures) -> str:
             "Sum over the parameters of absolute errors\n" + columns(summary(result, paper)),
             "Mean of it after each step\n" + columns(_by_step(result)),
             "Mean of it by visible fraction\n" + columns(by_visible_fraction(result)),
-            "Mean absolute error of each parameter\n" + columns(_by_parameter(result, paper)),
+            "Mean absolute error of each parameter\n" + columns(by_parameter(result, paper)),
         ]
     )
 
@@ -55,7 +56,7 @@ def summary(result: dict[str, Any], paper: PaperFigures) -> Rows:
                 name,
                 *[error(method[key]) for key in ("mean", "median", "p95")],
                 error(figure),
-                f"{method['mean'] / figure:.2f}" if figure else NONE,
+                _ratio(method["mean"], figure),
                 f"{100 * method['coverage95']:.1f} %" if "coverage95" in method else NONE,
                 f"{method['milliseconds']:.1f}",
                 str(method["samples"]),
@@ -76,9 +77,23 @@ def by_visible_fraction(result: dict[str, Any]) -> Rows:
     return rows
 
 
+def by_parameter(result: dict[str, Any], paper: PaperFigures) -> Rows:
+    """Return the mean errors of each parameter, beside the paper's."""
+    methods = result["methods"]
+    names = list(next(iter(methods.values()))["per_parameter"])
+    rows = [["method", *names]]
+    for name, method in methods.items():
+        rows.append([name, *[error(method["per_parameter"][parameter]) for parameter in names]])
+    for name, figures in paper.items():
+        rows.append([f"paper {name}", *[error(figures.get(parameter)) for parameter in names]])
+    return rows
+
+
 def error(value: float | None) -> str:
     """Return an error in digits, or the sign for none."""
-    return NONE if value is None else f"{value:.5f}"
+    if value is None:
+        return NONE
+    return f"{value:.1e}" if 0.0 < value < FEW_DIGITS else f"{value:.5f}"
 
 
 def _by_step(result: dict[str, Any]) -> Rows:
@@ -90,12 +105,8 @@ def _by_step(result: dict[str, Any]) -> Rows:
     return rows
 
 
-def _by_parameter(result: dict[str, Any], paper: PaperFigures) -> Rows:
-    methods = result["methods"]
-    names = list(next(iter(methods.values()))["per_parameter"])
-    rows = [["method", *names]]
-    for name, method in methods.items():
-        rows.append([name, *[error(method["per_parameter"][parameter]) for parameter in names]])
-    for name, figures in paper.items():
-        rows.append([f"paper {name}", *[error(figures.get(parameter)) for parameter in names]])
-    return rows
+def _ratio(value: float, figure: float | None) -> str:
+    if figure is None:
+        return NONE
+    ratio = value / figure
+    return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.2g}"

@@ -30,6 +30,10 @@ build: $(BUILT)  ## set up the environment and build all packages (4 minutes the
 demo: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
 	@./run kmn_perception demo_bag
 
+.PHONY: evaluate
+evaluate: build  ## regenerate docs/results, table and figures; an interrupted one goes on (1 hour)
+	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results
+
 .PHONY: test
 test: build lint $(READY)simulation  ## run the style checks and all tests
 	@echo "==> Testing"

@@ -48,6 +48,7 @@ setup(
                 "demo_bag",
                 "train",
                 "evaluate",
+                "results",
                 "benchmark",
             )
         ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -38,7 +39,8 @@ class CascadeSettings:
     hidden
         Width of the hidden layer.
     slack
-        Sizes are kept within their limits and this part of their range.
+        By this part of their range (of gamma) or of themselves (scales) sizes may exceed their
+        limits.
     window
         How the windows are rendered.
     """
@@ -244,6 +246,29 @@ class Cascade(MorphNetwork):
         kinds = [kind for kind, _ in self.model.transformation.kinds]
         return np.array([kind == "scale" for kind in kinds] + [True] * len(self.model.gamma))
 
+    @cached_property
+    def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n + m,) lower and upper bounds of estimates: of sizes somewhat beyond their limits.
+
+        Within these all bodies have a size. Where the limits of gamma leave no room for that, they
+        are the bounds.
+        """
+        model, slack = self.model, self.settings.slack
+        low, high = model.limits.T.copy()
+        gamma_low, gamma_high = model.split(low)[1], model.split(high)[1]
+        room = slack * (gamma_high - gamma_low)
+        corners = itertools.product(*zip(gamma_low - room, gamma_high + room, strict=True))
+        if all(body.size(corner).min() > 0.0 for corner in corners for body in model.bodies):
+            gamma_low -= room
+            gamma_high += room
+        for i, (kind, _) in enumerate(model.transformation.kinds):
+            if kind == "scale":
+                low[i] = (1.0 + low[i]) / (1.0 + slack) - 1.0
+                high[i] = (1.0 + high[i]) * (1.0 + slack) - 1.0
+            else:
+                low[i], high[i] = -np.inf, np.inf
+        return low, high
+
     @torch.inference_mode()
     def predict(self, step: int, inputs: Inputs) -> NDArray[np.float64]:
         """Return what is left of theta and gamma (B, n + m)."""
@@ -259,10 +284,7 @@ class Cascade(MorphNetwork):
         theta, gamma = self.model.split(values)
         theta_bar, gamma_bar = self.model.split(predicted)
         theta = self.model.transformation.concatenate(theta, theta_bar)
-        total = np.concatenate((theta, gamma + gamma_bar), axis=-1)
-        low, high = self.model.limits.T
-        slack = self.settings.slack * (high - low)
-        return np.where(self._is_size, np.clip(total, low - slack, high + slack), total)
+        return np.clip(np.concatenate((theta, gamma + gamma_bar), axis=-1), *self._bounds)
 
     def remainder(
         self, values: NDArray[np.float64], truth: NDArray[np.float64]

@@ -165,7 +165,7 @@ class MorphEstimator:
             self.network, [observation], settings.iterations, settings.tolerance
         )
         values, change = prediction.values[0], float(prediction.change[0])
-        covariance = np.full((len(values), len(values)), np.nan)
+        covariance: NDArray[np.float64] = np.full((len(values),) * 2, np.nan)
         if settings.refine:
             fit = refine(model, observation, values, self.refinement)
             values, covariance, doubt = fit.values, fit.covariance, fit.reason

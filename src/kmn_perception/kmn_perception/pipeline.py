@@ -8,8 +8,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
-from kmn_perception.intrinsics import camera_of_points
+from kmn_perception.intrinsics import camera_as_dense, camera_of_points
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, remove_background
@@ -90,25 +91,31 @@ class MorphPipeline:
         return self.estimator.estimate(observation)
 
     def observe(self, points: NDArray[np.float32], in_world: bool = False) -> Observation | None:
-        """Return what is seen of the object; None if the camera's pose cannot be found.
-
-        The intrinsics are those that an organised cloud shows. Without rows and columns, or in the
-        world frame, they are taken to be those of the canonical camera.
-        """
+        """Return what is seen of the object; None if the camera's pose cannot be found."""
         pose = self._find_camera_pose(points, in_world)
         if pose is None:
             return None
-        camera = None
-        if points.ndim == 3 and not in_world:
-            camera = camera_of_points(points, pose)
         background = self.settings.background
-        return Observation(
-            points=remove_background(
-                points, np.eye(4) if in_world else pose, pose[:3, 3], background
-            ),
-            camera=camera or replace(self.estimator.model.camera, pose=pose),
-            floor=background.plane_margin if background.remove_plane else -np.inf,
-        )
+        to_world = np.eye(4) if in_world else pose
+        seen = remove_background(points, to_world, pose[:3, 3], background)
+        floor = background.plane_margin if background.remove_plane else -np.inf
+        camera = self._find_camera(points, seen, to_world, pose)
+        return Observation(seen, camera, floor)
+
+    def _find_camera(
+        self,
+        points: NDArray[np.float32],
+        seen: NDArray[np.float32],
+        to_world: NDArray[np.float64],
+        pose: NDArray[np.float64],
+    ) -> Camera:
+        """Return the camera that an organised cloud shows, else one with the canonical view."""
+        if points.ndim == 3:
+            to_camera = np.linalg.inv(pose) @ to_world
+            camera = camera_of_points(points, to_camera, pose)
+            if camera is not None:
+                return camera
+        return camera_as_dense(seen, replace(self.estimator.model.camera, pose=pose))
 
     def _find_camera_pose(
         self, points: NDArray[np.float32], in_world: bool

@@ -9,11 +9,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
+from kmn_perception.configuration import ConfigurationError
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation, splat
 from kmn_perception.rendering import render
 
 CHANNELS = 3  # coverage, depth about the prototype's surface, seen at all
+RAMP = 8.0  # sensor pixels across the border of its image, from unseen to seen
+LEAST_INVERSE_DEPTH = 1e-3  # 1/m; keeps the horizon of the plane finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +48,18 @@ class Window:
             Size of the window over that of the body's image.
         area
             Number of pixels, about; both sides are multiples of 8.
+
+        Raises
+        ------
+        ConfigurationError
+            If the canonical camera does not see the prototype's body.
         """
         prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
         v, u = np.nonzero(~np.isnan(render(prototype[body : body + 1], model.camera)))
+        if not len(u):
+            raise ConfigurationError(
+                f"{model.name}: the camera does not see the prototype's {model.bodies[body].name}"
+            )
         low, high = np.array([u.min(), v.min()]) - 0.5, np.array([u.max(), v.max()]) + 0.5
         centre, size = (low + high) / 2.0, (high - low) * margin
         pixels = np.maximum(8, np.rint(np.sqrt(area * size / size[::-1]) / 8.0).astype(int) * 8)
@@ -164,7 +176,7 @@ def _compare(
             if np.isinf(buffer[row, column]):
                 continue
             u, v = (column + 0.5) / block - 0.5, (row + 0.5) / block - 0.5
-            inverse = max(1e-3, plane[0] * u + plane[1] * v + plane[2])
+            inverse = max(LEAST_INVERSE_DEPTH, plane[0] * u + plane[1] * v + plane[2])
             behind = (buffer[row, column] - 1.0 / inverse) / reach
             image[0, row // block, column // block] += share
             image[1, row // block, column // block] += share * min(1.0, max(-1.0, behind))
@@ -181,10 +193,9 @@ def _mark_seen(
     height: float,
 ) -> None:
     """Set 1 where the plane lies in the sensor's image, 0 outside, with a ramp between."""
-    ramp = 8.0  # sensor pixels
     for row in range(seen.shape[0]):
         for column in range(seen.shape[1]):
-            z = 1.0 / max(1e-3, plane[0] * column + plane[1] * row + plane[2])
+            z = 1.0 / max(LEAST_INVERSE_DEPTH, plane[0] * column + plane[1] * row + plane[2])
             x = (column - window[2]) / window[0] * z
             y = (row - window[3]) / window[1] * z
             depth = (
@@ -197,4 +208,4 @@ def _mark_seen(
             u = sensor[0] * u / depth + sensor[2] + 0.5
             v = sensor[1] * v / depth + sensor[3] + 0.5
             inside = min(min(u, width - u), min(v, height - v))
-            seen[row, column] = min(1.0, max(0.0, 0.5 + inside / ramp))
+            seen[row, column] = min(1.0, max(0.0, 0.5 + inside / RAMP))

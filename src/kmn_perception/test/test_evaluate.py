@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import json
+import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,46 +18,48 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from kmn_perception import weights
+from kmn_perception import resources, weights
+from kmn_perception.evaluation.comparison import Measurement, Request
 from kmn_perception.evaluation.errors import absolute_errors
-from kmn_perception.evaluation.evaluate import Tally, main
-from kmn_perception.evaluation.methods import Method
+from kmn_perception.evaluation.evaluate import evaluate, main
 from kmn_perception.evaluation.settings import EvaluationSettings
+from kmn_perception.evaluation.tally import Tally
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.network import MorphNetwork
+from kmn_perception.paper_network import PaperNetwork
 from kmn_perception.training.samples import EVALUATION, sample
 
 BOX, BOX_A = KinematicModel.load("box"), KinematicModel.load("box_a")
 SENSOR = {
     "camera": "kinect_v1", "distance": [0.5, 1.5], "azimuth": [-0.6, 0.6], "elevation": [0.4, 1.2],
-    "noise": "kinect", "occlusion": 0.0, "cut_height": 0.0,
+    "noise": "kinect", "holes": 0.0, "pose_error": [0.0, 0.0], "occlusion": 0.0, "cut_height": 0.0,
 }  # fmt: skip
+SETTINGS = EvaluationSettings.load()
 
 
-def constant(model: KinematicModel, answer: list[float]) -> MorphNetwork:
+def constant(model: KinematicModel, answer: list[float]) -> PaperNetwork:
     """Return a network that answers the same (theta, gamma) to every image."""
-    network = MorphNetwork(model, [1, 1, 1, 1, 1])
+    network = PaperNetwork(model, [1, 1, 1, 1, 1])
     with torch.no_grad():
         network.linear.weight.zero_()
         network.linear.bias.copy_(network.encoding.encode(torch.tensor([answer]))[0])
     return network
 
 
-def save_constants(
-    folder: Path, name: str, baseline: list[float], kmn: list[float], **training: Any
-) -> Path:
-    model, path = KinematicModel.load(name), folder / f"{name}.safetensors"
-    known = {**weights.describe(model), "channels": [1, 1, 1, 1, 1], "training": training}
-    networks = constant(model, kmn), constant(model, baseline)
-    weights.save(path, weights.Weights(*networks, known))
-    return path
+def save_constant(
+    path: Path, name: str, answer: list[float], baseline: list[float] | None = None, **training: Any
+) -> str:
+    """Write weights that answer the same to every image; return the path."""
+    model = KinematicModel.load(name)
+    known = {**weights.describe(model), "training": training}
+    first = None if baseline is None else constant(model, baseline)
+    weights.save(path, weights.Weights(constant(model, answer), first, known))
+    return str(path)
 
 
-def run(path: Path, *more: str) -> dict[str, Any]:
-    out = path.parent / "result.json"
-    main(["--model", path.stem, "--weights", str(path), "--json", str(out), *more])
+def run(folder: Path, name: str, *more: str) -> dict[str, Any]:
+    out = folder / "result.json"
+    main(["--model", name, "--json", str(out), *more])
     result: dict[str, Any] = json.loads(out.read_text())
     return result
 
@@ -63,71 +68,131 @@ def test_the_written_errors_are_those_of_known_predictions(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A box that is only moved: k predictions of a step (a, b) lead to (k a, k b)."""
-    path = save_constants(tmp_path, "box_a", [0.1, 0.02], [-0.03, 0.05])
-    result = run(path, "--samples", "20", "--seed", "4", "--methods", "baseline", "kmn")
+    steps = {"baseline": [0.1, 0.02], "kmn_paper": [-0.03, 0.05], "kmn": [0.04, 0.01]}
+    paper = save_constant(
+        tmp_path / "paper.safetensors", "box_a", steps["kmn_paper"], steps["baseline"]
+    )
+    own = save_constant(tmp_path / "own.safetensors", "box_a", steps["kmn"])
+    given = ("--samples", "20", "--seed", "4", "--weights", own, "--paper-weights", paper)
+    result = run(tmp_path, "box_a", *given, "--methods", *steps)
     printed = capsys.readouterr().out.splitlines()
-    assert {key: value for key, value in result.items() if key != "methods"} == {
+    assert {key: result[key] for key in ("model", "samples", "seed", "noise")} == {
         "model": "box_a", "samples": 20, "seed": 4, "noise": "none",
     }  # fmt: skip
+    assert result["weights"] == {
+        role: hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
+        for role, file in (("paper", paper), ("own", own))
+    }
+    assert shlex.split(result["command"]) == [
+        "./run", "kmn_perception", "evaluate", "--model", "box_a", *given, "--methods", *steps,
+    ]  # fmt: skip
+    assert datetime.fromisoformat(result["date"]).tzinfo is not None
+    assert list(result["methods"]) == list(steps)
     truth = np.stack([sample(BOX_A, 4, i, spawn_key=EVALUATION)[1] for i in range(20)])
-    for name, step, counted in (("baseline", [0.1, 0.02], 1), ("kmn", [-0.03, 0.05], 5)):
-        errors = np.abs(np.arange(6)[:, None, None] * np.array(step) - truth)
+    for name, step in steps.items():
+        counted = 1 if name == "baseline" else 5
+        errors = np.abs(np.arange(11)[:, None, None] * np.array(step) - truth)
         sums = errors.sum(axis=2)
         found = result["methods"][name]
-        assert found.pop("milliseconds") > 0.0
-        assert found.pop("by_step") == pytest.approx(sums.mean(axis=1), abs=1e-6)
-        assert found.pop("per_parameter") == pytest.approx(
+        assert found["samples"] == 20
+        assert found["milliseconds"] > 0.0
+        assert found["by_step"] == pytest.approx(sums.mean(axis=1), abs=1e-6)
+        assert found["by_step_std"] == pytest.approx(sums.std(axis=1), abs=1e-6)
+        assert found["per_parameter"] == pytest.approx(
             dict(zip("xy", errors[counted].mean(axis=0), strict=True)), abs=1e-6
         )
-        assert found == pytest.approx(
-            {
-                "mean": sums[counted].mean(),
-                "median": np.median(sums[counted]),
-                "p95": np.quantile(sums[counted], 0.95),
-            },
-            abs=1e-6,
-        )
-        summary = next(line for line in printed if line.startswith(name))
-        paper = EvaluationSettings.load().paper["box_a"][name]["mean"]
+        assert found["mean"] == pytest.approx(sums[counted].mean(), abs=1e-6)
+        assert found["median"] == pytest.approx(np.median(sums[counted]), abs=1e-6)
+        assert found["p95"] == pytest.approx(np.quantile(sums[counted], 0.95), abs=1e-6)
+        assert found["best"] == np.argsort(sums[counted])[:3].tolist()
+        assert found["worst"] == np.argsort(-sums[counted])[:3].tolist()
+        figure = SETTINGS.paper["box_a"]["baseline" if name == "baseline" else "kmn"]["mean"]
+        summary = next(line for line in printed if line.startswith(f"{name} "))
         assert summary.split()[1] == f"{found['mean']:.5f}"
-        assert summary.split()[4:6] == [f"{paper:.5f}", f"{found['mean'] / paper:.2f}"]
+        assert summary.split()[4:6] == [f"{figure:.5f}", f"{found['mean'] / figure:.2f}"]
 
 
-def test_before_any_step_the_estimate_is_the_prototype(tmp_path: Path) -> None:
-    model = KinematicModel.load("door")
-    path = save_constants(tmp_path, "door", [0.1] * 7, [0.1] * 7)
-    methods = run(path, "--samples", "10")["methods"]
-    truth = [sample(model, 0, i, spawn_key=EVALUATION)[1] for i in range(10)]
-    assert list(methods) == ["baseline", "kmn"]
-    for method in methods.values():
-        assert method["by_step"][0] == pytest.approx(np.abs(truth).sum(axis=1).mean())
+@pytest.mark.parametrize("name", ["box_a", "door"])
+def test_every_method_has_a_row_for_every_model(tmp_path: Path, name: str) -> None:
+    count = len(KinematicModel.load(name).parameters)
+    paper = save_constant(tmp_path / "paper.safetensors", name, [0.1] * count, [0.1] * count)
+    own = save_constant(tmp_path / "own.safetensors", name, [0.0] * count)
+    result = run(tmp_path, name, "--samples", "3", "--weights", own, "--paper-weights", paper)
+    methods = result["methods"]
+    assert list(methods) == [
+        "baseline", "kmn_paper", "kmn", "kmn_refined", "multistart",
+        "icp", "icp_identity", "icp_plane", "small_gicp", "information_limit",
+    ]  # fmt: skip
+    for figures in methods.values():
+        parts = figures["by_visible_fraction"]
+        assert [part["low"] for part in parts] == list(SETTINGS.visible_bins[:-1])
+        assert sum(part["samples"] for part in parts) == 3
+    assert {key for key in methods if "coverage95" in methods[key]} == {"kmn_refined", "multistart"}
+    # A network that predicts no change stays at the start, from where the refinement begins.
+    assert methods["kmn"]["by_step"] == pytest.approx([methods["kmn"]["by_step"][0]] * 11)
+    assert methods["kmn_refined"]["by_step"][0] == pytest.approx(methods["kmn"]["mean"])
+    assert methods["kmn_refined"]["mean"] < 0.5 * methods["kmn"]["mean"]
+    truth = [sample(KinematicModel.load(name), 0, i, spawn_key=EVALUATION)[1] for i in range(3)]
+    assert methods["icp_identity"]["by_step"][0] == pytest.approx(np.abs(truth).sum(axis=1).mean())
 
 
-def test_icp_is_compared_where_it_applies(tmp_path: Path) -> None:
-    path = save_constants(tmp_path, "box_a", [0.0] * 2, [0.0] * 2)
-    methods = run(path, "--samples", "3")["methods"]
-    assert list(methods) == ["baseline", "kmn", "icp"]
-    start, aligned = methods["icp"]["by_step"]
-    assert start == methods["kmn"]["by_step"][0]
-    assert aligned < 0.5 * start
+def test_slow_peers_are_measured_on_fewer_samples_unless_they_are_asked_for() -> None:
+    few = dataclasses.replace(SETTINGS, peer_samples=2)
+    methods = evaluate(Request("box_a", seed=0), 4, 1, few)["methods"]
+    counts = {name: methods[name]["samples"] for name in ("kmn_paper", "icp", "information_limit")}
+    assert counts == {"kmn_paper": 4, "icp": 2, "information_limit": 4}
+    methods = evaluate(Request("box_a", seed=0, methods=("small_gicp",)), 4, 1, few)["methods"]
+    assert methods["small_gicp"]["samples"] == 4
+
+
+def test_rows_without_weights_are_left_out_with_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A user's own model, before anything was trained."""
+    file = tmp_path / "carton.yaml"
+    shipped = resources.find("config/models", "box_a").read_text()
+    file.write_text(shipped.replace("name: box_a", "name: carton"))
+    result = run(tmp_path, str(file), "--samples", "2")
+    assert list(result["methods"]) == [
+        "multistart", "icp", "icp_identity", "icp_plane", "small_gicp", "information_limit",
+    ]  # fmt: skip
+    assert result["weights"] == {}
+    lines = capsys.readouterr().err
+    for name in ("baseline", "kmn_paper", "kmn", "kmn_refined"):
+        assert f"{name} is left out: no weights: " in lines
+    with pytest.raises(SystemExit, match="evaluate: kmn_paper: no weights: 'paper/carton'"):
+        run(tmp_path, str(file), "--samples", "2", "--methods", "kmn_paper")
 
 
 def test_the_figures_of_a_tally_are_those_computed_by_hand() -> None:
-
-    def estimates(cloud: NDArray[np.float32]) -> Iterator[NDArray[np.float64]]:
-        yield np.zeros(2)
-        yield np.array([0.1, -0.2])
-
-    tally = Tally(BOX_A, Method(estimates, counted=1), steps=5)
-    nothing = np.empty((0, 3), dtype=np.float32)
-    for truth in ([0.1, -0.2], [0.1, 0.0], [0.4, -0.2]):
-        tally.add(nothing, np.array(truth))
+    tally = Tally(BOX_A, 1, dataclasses.replace(SETTINGS, visible_bins=(0.0, 0.5, 0.999, 1.0)))
+    start = np.array([[0.2, 0.1], [0.1, 0.0], [0.3, 0.3], [0.0, 0.0]])
+    results = np.array([[0.0, 0.0], [0.0, 0.2], [0.3, 0.0], [0.1, 0.5]])
+    for visible, *errors, covered in zip(
+        [1.0, 0.999, 0.5, 0.4], start, results, [True, True, False, True], strict=True
+    ):
+        tally.add(visible, Measurement(np.stack(errors), 0.1, covered))
     figures = tally.summary()
-    assert figures["by_step"] == pytest.approx([(0.3 + 0.1 + 0.6) / 3, (0.0 + 0.2 + 0.3) / 3])
-    assert figures["mean"] == pytest.approx(0.5 / 3)
-    assert figures["median"] == pytest.approx(0.2)
-    assert figures["p95"] == pytest.approx(0.29)  # a tenth of the way from 0.3 back to 0.2
-    assert figures["per_parameter"] == pytest.approx({"x": 0.1, "y": 0.2 / 3})
+    assert figures["samples"] == 4
+    assert figures["by_step"] == pytest.approx([0.25, 0.275])
+    assert figures["by_step_std"][1] == pytest.approx(np.std([0.0, 0.2, 0.3, 0.6]))
+    assert figures["mean"] == pytest.approx(0.275)
+    assert figures["median"] == pytest.approx(0.25)
+    assert figures["p95"] == pytest.approx(0.555)  # 15 % of the way from 0.6 back to 0.3
+    assert figures["per_parameter"] == pytest.approx({"x": 0.1, "y": 0.175})
+    assert (figures["best"], figures["worst"]) == ([0, 1, 2], [3, 2, 1])
+    assert figures["coverage95"] == 0.75
+    assert figures["milliseconds"] == pytest.approx(100.0)
+    bins = [[part[key] for key in ("samples", "mean")] for part in figures["by_visible_fraction"]]
+    assert bins == [[1, pytest.approx(0.6)], [1, pytest.approx(0.3)], [2, pytest.approx(0.1)]]
+
+
+def test_an_empty_bin_has_no_errors() -> None:
+    tally = Tally(BOX_A, 0, SETTINGS)
+    tally.add(1.0, Measurement(np.zeros((1, 2)), 0.1, None))
+    figures = tally.summary()
+    assert figures["by_visible_fraction"][0]["mean"] is None
+    assert "coverage95" not in figures
 
 
 @settings(deadline=None)
@@ -154,23 +219,36 @@ def test_no_sample_of_any_seed_is_one_that_trains(
 
 
 def test_a_seed_gives_the_same_errors_again_and_another_seed_others(tmp_path: Path) -> None:
-    path = save_constants(tmp_path, "box_b", [0.0] * 3, [0.0] * 3)
+    few = ("--samples", "5", "--methods", "icp", "--seed")
     first, again, other = (
-        run(path, "--samples", "5", "--methods", "kmn", "--seed", seed)["methods"]["kmn"]["by_step"]
-        for seed in ("7", "7", "8")
+        run(tmp_path, "box_b", *few, seed)["methods"]["icp"]["by_step"] for seed in ("7", "7", "8")
     )
     assert first == again != other
 
 
+def test_several_processes_measure_the_same_as_one(tmp_path: Path) -> None:
+    few = ("--samples", "51", "--methods", "kmn_paper", "information_limit", "--jobs")
+    one, two = (run(tmp_path, "box_a", *few, jobs)["methods"] for jobs in ("1", "2"))
+    for figures in (*one.values(), *two.values()):
+        del figures["milliseconds"]
+    assert one == two
+
+
 def test_samples_are_seen_as_in_training_unless_noise_is_given(tmp_path: Path) -> None:
-    path = save_constants(tmp_path, "box", [0.0] * 6, [0.0] * 6, sensor=SENSOR)
-    few = ("--samples", "3", "--methods", "kmn")
-    trained, exact = run(path, *few), run(path, *few, "--noise", "none")
+    weights_of = {
+        name: save_constant(
+            tmp_path / f"{name}.safetensors", name, [0.0] * count, [0.0] * count, sensor=sensor
+        )
+        for name, count, sensor in (("box", 6, SENSOR), ("box_a", 2, None))
+    }
+    few = ("--samples", "3", "--methods", "baseline", "--paper-weights")
+    trained = run(tmp_path, "box", *few, weights_of["box"])
+    exact = run(tmp_path, "box", *few, weights_of["box"], "--noise", "none")
     assert (trained["noise"], exact["noise"]) == ("kinect", "none")
     # The start, above the cloud's centre, depends on what the sensor sees.
-    steps = [result["methods"]["kmn"]["by_step"][0] for result in (trained, exact)]
+    steps = [result["methods"]["baseline"]["by_step"][0] for result in (trained, exact)]
     assert steps[0] != steps[1]
-    assert run(save_constants(tmp_path, "box_a", [0.0] * 2, [0.0] * 2), *few)["noise"] == "none"
+    assert run(tmp_path, "box_a", *few, weights_of["box_a"])["noise"] == "none"
 
 
 @pytest.mark.parametrize(
@@ -179,10 +257,11 @@ def test_samples_are_seen_as_in_training_unless_noise_is_given(tmp_path: Path) -
         (["--weights", "nowhere.safetensors"], "no weights: 'nowhere.safetensors'"),
         (["--model", "box_b"], "trained for another model"),
         (["--model", "boat"], "'boat' is neither a file nor one of the shipped config/models"),
-        (["--methods", "icp"], "icp does not apply to 'door'"),
+        (["--methods", "baseline"], "baseline: the weights of 'door' hold no baseline"),
         (["--methods", "magic"], "invalid choice: 'magic'"),
         (["--seed", "-1"], "-1 is not a whole number from 0"),
         (["--samples", "0"], "0 is not a whole number from 1"),
+        (["--jobs", "0"], "0 is not a whole number from 1"),
         (
             ["--json", "nowhere/result.json"],
             "nowhere/result.json is not a file in a folder that exists",
@@ -192,18 +271,18 @@ def test_samples_are_seen_as_in_training_unless_noise_is_given(tmp_path: Path) -
 def test_bad_arguments_end_with_a_message(
     tmp_path: Path, more: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = save_constants(tmp_path, "door", [0.0] * 7, [0.0] * 7)
+    path = save_constant(tmp_path / "door.safetensors", "door", [0.0] * 7)
     with pytest.raises(SystemExit) as ending:
-        main(["--model", "door", "--weights", str(path), "--samples", "2", *more])
+        main(["--model", "door", "--paper-weights", path, "--samples", "2", *more])
     assert message in f"{ending.value} {capsys.readouterr().err}"
 
 
-def test_ctrl_c_ends_it_without_a_traceback(tmp_path: Path) -> None:
-    path = save_constants(tmp_path, "box_a", [0.0] * 2, [0.0] * 2)
-    module = "kmn_perception.evaluation.evaluate"
-    command = [sys.executable, "-m", module, "--model", "box_a", "--weights", str(path)]
+def test_ctrl_c_ends_it_without_a_traceback() -> None:
+    command = [sys.executable, "-m", "kmn_perception.evaluation.evaluate", "--model", "box_a"]
     with subprocess.Popen(
-        [*command, "--samples", "100000"], stderr=subprocess.PIPE, text=True
+        [*command, "--methods", "icp", "--samples", "100000", "--jobs", "2"],
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
         assert process.stderr is not None
         assert any("evaluate box_a" in line for line in process.stderr)

@@ -139,3 +139,15 @@ def test_observations_are_predicted_together_as_alone() -> None:
     for observation, values in zip(seen, together, strict=True):
         alone, _ = predict(network, [observation], steps=2)
         np.testing.assert_allclose(alone.values[0], values, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["box_c", "door", "box"])
+@pytest.mark.parametrize("factor", [-100.0, 100.0])
+def test_a_cascade_that_diverges_still_has_bodies_with_a_size(name: str, factor: float) -> None:
+    model = KinematicModel.load(name)
+    network = Cascade(model, CascadeSettings.load(), stages=0)
+    values = np.zeros((1, len(model.parameters)))
+    for _ in range(3):
+        values = network.concatenate(values, factor * np.abs(model.limits[None, :, 1]))
+    cubes = model.unit_cubes(*model.split(values[0]))
+    assert np.linalg.det(cubes[:, :3, :3]).min() > 0.0

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from kmn_perception.camera import look_at
 from kmn_perception.cascade import CascadeSettings
+from kmn_perception.configuration import ConfigurationError
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_cloud, render
@@ -114,3 +115,10 @@ def test_an_estimate_that_is_off_shows_by_how_much() -> None:
     shift = (off.sum(axis=0) @ columns / off.sum()) - (right.sum(axis=0) @ columns / right.sum())
     depth = np.linalg.norm(model.camera.pose[:3, 3])
     assert shift == pytest.approx(0.05 * window.camera.fx / depth, rel=0.1)
+
+
+def test_a_camera_that_does_not_see_a_body_is_refused() -> None:
+    model = MODELS["door"]
+    away = replace(model.camera, pose=look_at([-2.5, 0.0, 1.8], [-5.0, 0.0, 1.8]))
+    with pytest.raises(ConfigurationError, match="does not see the prototype's handle"):
+        Window.around(replace(model, camera=away), 1, margin=2.0, area=1024)

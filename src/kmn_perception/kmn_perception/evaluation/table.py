@@ -6,12 +6,24 @@ from typing import Any
 
 from kmn_perception.columns import columns
 from kmn_perception.evaluation.settings import PaperFigures
-from kmn_perception.kinematic_model import KinematicModel
 
 NONE = "-"
+FEW_DIGITS = 1e-4  # smaller errors are written with an exponent
+
+PAPER_METHOD = {
+    "baseline": "baseline",
+    "kmn_paper": "kmn",
+    "kmn": "kmn",
+    "kmn_refined": "kmn",
+    "icp": "icp",
+    "icp_identity": "icp",
+}
+"""With which of the paper's methods a method is compared."""
+
+Rows = list[list[str]]
 
 
-def report(model: KinematicModel, result: dict[str, Any], paper: PaperFigures) -> str:
+def report(result: dict[str, Any], paper: PaperFigures) -> str:
     """Return the tables of an evaluation, beside the paper's figures.
 
     Parameters
@@ -26,49 +38,75 @@ def report(model: KinematicModel, result: dict[str, Any], paper: PaperFigures) -
     return "\n\n".join(
         [
             title,
-            "Sum over the parameters of absolute errors\n" + _summary(result, paper),
-            "Mean of it after each step\n" + _by_step(result),
-            "Mean absolute error of each parameter\n" + _by_parameter(model, result, paper),
+            "Sum over the parameters of absolute errors\n" + columns(summary(result, paper)),
+            "Mean of it after each step\n" + columns(_by_step(result)),
+            "Mean of it by visible fraction\n" + columns(by_visible_fraction(result)),
+            "Mean absolute error of each parameter\n" + columns(by_parameter(result, paper)),
         ]
     )
 
 
-def _summary(result: dict[str, Any], paper: PaperFigures) -> str:
-    rows = [["method", "mean", "median", "p95", "paper", "of paper", "ms"]]
+def summary(result: dict[str, Any], paper: PaperFigures) -> Rows:
+    """Return the figures of all methods beside the paper's."""
+    rows = [["method", "mean", "median", "p95", "paper", "of paper", "in 95 %", "ms", "samples"]]
     for name, method in result["methods"].items():
-        figure = paper.get(name, {}).get("mean")
+        figure = paper.get(PAPER_METHOD.get(name, ""), {}).get("mean")
         rows.append(
             [
                 name,
-                *[_error(method[key]) for key in ("mean", "median", "p95")],
-                _error(figure),
-                f"{method['mean'] / figure:.2f}" if figure else NONE,
+                *[error(method[key]) for key in ("mean", "median", "p95")],
+                error(figure),
+                _ratio(method["mean"], figure),
+                f"{100 * method['coverage95']:.1f} %" if "coverage95" in method else NONE,
                 f"{method['milliseconds']:.1f}",
+                str(method["samples"]),
             ]
         )
-    return columns(rows)
+    return rows
 
 
-def _by_step(result: dict[str, Any]) -> str:
+def by_visible_fraction(result: dict[str, Any]) -> Rows:
+    """Return the mean errors of all methods by how much of the object is in the image."""
+    methods = result["methods"]
+    bins = next(iter(methods.values()))["by_visible_fraction"]
+    rows = [["visible", *[f"{part['low']:g} to {part['high']:g}" for part in bins]]]
+    for name, method in methods.items():
+        rows.append([name, *[error(part["mean"]) for part in method["by_visible_fraction"]]])
+    most = max(methods.values(), key=lambda method: int(method["samples"]))
+    rows.append(["samples", *[str(part["samples"]) for part in most["by_visible_fraction"]]])
+    return rows
+
+
+def by_parameter(result: dict[str, Any], paper: PaperFigures) -> Rows:
+    """Return the mean errors of each parameter, beside the paper's."""
+    methods = result["methods"]
+    names = list(next(iter(methods.values()))["per_parameter"])
+    rows = [["method", *names]]
+    for name, method in methods.items():
+        rows.append([name, *[error(method["per_parameter"][parameter]) for parameter in names]])
+    for name, figures in paper.items():
+        rows.append([f"paper {name}", *[error(figures.get(parameter)) for parameter in names]])
+    return rows
+
+
+def error(value: float | None) -> str:
+    """Return an error in digits, or the sign for none."""
+    if value is None:
+        return NONE
+    return f"{value:.1e}" if 0.0 < value < FEW_DIGITS else f"{value:.5f}"
+
+
+def _by_step(result: dict[str, Any]) -> Rows:
     most = max(len(method["by_step"]) for method in result["methods"].values())
     rows = [["step", *map(str, range(most))]]
     for name, method in result["methods"].items():
-        errors = [_error(error) for error in method["by_step"]]
+        errors = [error(value) for value in method["by_step"]]
         rows.append([name, *errors, *[NONE] * (most - len(errors))])
-    return columns(rows)
+    return rows
 
 
-def _by_parameter(model: KinematicModel, result: dict[str, Any], paper: PaperFigures) -> str:
-    methods = result["methods"]
-    rows = [["parameter", *[title for name in methods for title in (name, "paper")]]]
-    for parameter in model.parameters:
-        row = [f"{parameter.name} [{parameter.unit or 1}]"]
-        for name, method in methods.items():
-            row.append(_error(method["per_parameter"][parameter.name]))
-            row.append(_error(paper.get(name, {}).get(parameter.name)))
-        rows.append(row)
-    return columns(rows)
-
-
-def _error(value: float | None) -> str:
-    return NONE if value is None else f"{value:.5f}"
+def _ratio(value: float, figure: float | None) -> str:
+    if figure is None:
+        return NONE
+    ratio = value / figure
+    return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.2g}"

@@ -2,72 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.gauss_newton import Fit, Problem, fine_edges
+from kmn_perception.refinement.gauss_newton import Fit, fine_edges
+from kmn_perception.refinement.problem import Problem
 
 LEAST_INFORMATION = 1e-12
 LEAST_COMPONENT = 1e-3  # of a direction, in half ranges; less does not run into a limit
-BISECTIONS = 12
-PASSES = 2  # through several open directions
+DOUBLINGS, BISECTIONS = 4, 7  # in the search for a segment's ends
+POINTS = 12  # of a segment
+PASSES = 3  # through several open directions
+
+
+class Segment(NamedTuple):
+    """What is known along a direction: the median of how far to go, and the variance."""
+
+    median: float
+    variance: float
 
 
 def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the values (P,) amid what the observation leaves open, and their covariance (P, P).
 
     In most directions the covariance is the inverse of the information. Along those that the view
-    does not show, all values within the limits that do not contradict the observation are equally
-    likely: the estimate is the middle of that segment, the variance its squared length / 12.
+    hardly shows, all values within the limits are equally likely beforehand, and the estimate is
+    the median of what the edges leave of them.
     """
-    half = np.ptp(problem.limits, axis=1) / 2.0
+    half = problem.half_range
     information = (fit.depth_information + fit.edge_information) * np.outer(half, half)
     eigenvalues, directions = np.linalg.eigh(information)
     variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
     is_open = variances > problem.settings.weak**2
+    directions[:, is_open] = _disentangled(directions[:, is_open])
+    least = problem.settings.limit_softness**2
     values = fit.values
     for _ in range(PASSES if is_open.sum() > 1 else 1):
         for i in np.flatnonzero(is_open):
             direction = directions[:, i] * half
-            low, high = _segment(problem, fit, values, direction)
-            values = values + 0.5 * (low + high) * direction
-            variances[i] = (high - low) ** 2 / 12.0
+            segment = _segment(problem, fit, values, direction)
+            values = values + segment.median * direction
+            variances[i] = max(segment.variance, least)
     scaled = directions * half[:, None]
     return values, scaled * variances @ scaled.T
 
 
+def _disentangled(basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return another basis (P, K) of the same directions, each with a parameter of its own.
+
+    Each hidden end of an object is a direction, and any mixture of them is as open, but only along
+    the ends themselves does one not touch the bounds of another (Gauss-Jordan elimination).
+    """
+    basis = basis.copy()
+    own: list[int] = []
+    for k in range(basis.shape[1]):
+        free = np.abs(basis[:, k:])
+        free[own] = 0.0
+        parameter, column = divmod(int(np.argmax(free)), free.shape[1])
+        basis[:, [k, k + column]] = basis[:, [k + column, k]]
+        own.append(parameter)
+        basis[:, k] /= basis[parameter, k]
+        for other in range(basis.shape[1]):
+            if other != k:
+                basis[:, other] -= basis[parameter, other] * basis[:, k]
+    return basis / np.linalg.norm(basis, axis=0)
+
+
 def _segment(
     problem: Problem, fit: Fit, values: NDArray[np.float64], direction: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Return how far one can go back and forth along a direction before something speaks against."""
-    depth_information = direction @ fit.depth_information @ direction
+) -> Segment:
+    """Integrate the likelihood along a direction, within the limits.
+
+    Pixels far from the edges that are explained wrongly count as well. The edges count up to their
+    ends, so that the pixels that count do not change with them.
+    """
+    depth_information = float(direction @ fit.depth_information @ direction)
+
+    pixels = min(len(problem.image.pixels), problem.settings.misfit.pixels)
 
     def loss(way: float) -> float:
-        edges = fine_edges(problem, problem.view(values + way * direction), fit.noise.lateral)
-        return edges.loss + 0.5 * depth_information * way**2
+        moved = values + way * direction
+        edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
+        return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * way**2
 
     allowed = loss(0.0) + problem.settings.segment_rise
-    ends = []
-    for end in _within_limits(problem, values, direction):
-        good, bad = 0.0, end
-        if loss(end) <= allowed:
-            good = end
+    low, high = (
+        _last_allowed(loss, allowed, end) for end in _within_limits(problem, values, direction)
+    )
+    if high <= low:
+        return Segment(0.0, 0.0)
+    edges = np.linspace(low, high, POINTS + 1)
+    ways = 0.5 * (edges[1:] + edges[:-1])
+    losses = np.array([loss(way) for way in ways])
+    weights = np.exp(losses.min() - losses)
+    weights /= weights.sum()
+    median = float(np.interp(0.5, np.append(0.0, np.cumsum(weights)), edges))
+    cell = (high - low) / POINTS
+    return Segment(median, float(weights @ (ways - median) ** 2 + cell**2 / 12.0))
+
+
+def _last_allowed(loss: Callable[[float], float], allowed: float, end: float) -> float:
+    """Return how far towards an end the loss stays allowed."""
+    good, bad = 0.0, end
+    for way in end * 0.5 ** np.arange(DOUBLINGS, -1.0, -1.0):
+        if loss(way) > allowed:
+            bad = way
+            break
+        good = way
+    if good == end:
+        return end
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (good + bad)
+        if loss(middle) <= allowed:
+            good = middle
         else:
-            for _ in range(BISECTIONS):
-                middle = 0.5 * (good + bad)
-                if loss(middle) <= allowed:
-                    good = middle
-                else:
-                    bad = middle
-        ends.append(good)
-    return ends[0], ends[1]
+            bad = middle
+    return good
 
 
 def _within_limits(
     problem: Problem, values: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> tuple[float, float]:
     """Return the least and greatest multiple of a direction that keeps the limits."""
-    half = np.ptp(problem.limits, axis=1) / 2.0
+    half = problem.half_range
     moved = np.abs(direction) > LEAST_COMPONENT * half
     ways = (problem.limits[moved] - values[moved, None]) / direction[moved, None]
     return min(0.0, ways.min(axis=1).max()), max(0.0, ways.max(axis=1).min())

@@ -15,36 +15,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import View, add_normal_equations, meet
+from kmn_perception.refinement.geometry import View, add_normal_equations
 from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.silhouette import EdgeSettings, half_chord, scan, split
 
 LARGEST_WINDOW = 64  # pixels to either side of an edge
-ROOT_HALF, ROOT_TWO_PI = math.sqrt(0.5), math.sqrt(2.0 * math.pi)
-BODY, BEHIND, UNKNOWN = 1, -1, 0
-
-
-class EdgeSettings(NamedTuple):
-    """What tells a body from what lies before and behind it.
-
-    Attributes
-    ----------
-    occluder
-        What lies this much before the edge belongs to something else, metres.
-    background
-        So does what lies this much behind it where the model has nothing, metres.
-    contrast
-        Least step in depth that tells two bodies apart, metres.
-    floor_margin
-        Edges less than this above the floor are not used, metres.
-    outliers
-        Share of pixels that show anything.
-    """
-
-    occluder: float
-    background: float
-    contrast: float
-    floor_margin: float
-    outliers: float
+ROOT_HALF = math.sqrt(0.5)
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+FAR = 6.0  # standard deviations inside its own side, where a pixel says nothing more
+LOST = 0.25  # weight of a coarse sample without a step
+PHASES = 3.0  # an edge that crosses 1/3 of a pixel along its way averages where it cuts the rows
+VISIBLE = 0.5  # share of an edge's samples with a step, from which on it is in view
 
 
 class EdgeTerms(NamedTuple):
@@ -54,26 +35,32 @@ class EdgeTerms(NamedTuple):
     ----------
     hessian, gradient
         (P, P) and (P,) of the negative log-likelihood (Fisher scoring).
+    information
+        (P, P) the part of the hessian that comes from edges in view. Others only have bounds.
     loss
         The negative log-likelihood.
     noise_gradient, noise_information
         Its derivative by log s, and the information about log s.
-    found, lost
-        (B,) number of samples of each body at which there is a step, and there is none.
     """
 
     hessian: NDArray[np.float64]
     gradient: NDArray[np.float64]
+    information: NDArray[np.float64]
     loss: float
     noise_gradient: float
     noise_information: float
-    found: NDArray[np.int64]
-    lost: NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy")
 def edge_terms(
-    view: View, image: Image, settings: EdgeSettings, window: float, noise: float
+    view: View,
+    image: Image,
+    settings: EdgeSettings,
+    window: float,
+    noise: float,
+    depth_noise: float,
+    border: float,
+    most: int,
 ) -> EdgeTerms:
     """Compare the pixels within ``window`` pixels of each silhouette edge with the edge.
 
@@ -82,224 +69,148 @@ def edge_terms(
     noise
         s in pixels; 0 for a coarse search, in which each sample pulls the edge to the nearest step
         of its row or column with a standard deviation of a third of the window.
+    depth_noise
+        Of the inverse depth, 1 / m.
+    border
+        Samples nearer than this to the ends of an edge are left out, pixels.
+    most
+        At most about so many samples are taken of each edge.
     """
-    solids, lines, all_ends, faces = view.solids, view.lines, view.ends, view.faces
-    inverse_depth, upwards, floor = image.inverse_depth, image.upwards, image.floor
-    bodies, parameters = lines.shape[0], view.line_slopes.shape[3]
+    parameters = view.line_slopes.shape[3]
     hessian, gradient = np.zeros((parameters, parameters)), np.zeros(parameters)
-    found, lost = np.zeros(bodies, dtype=np.int64), np.zeros(bodies, dtype=np.int64)
+    information, unused = np.zeros((parameters, parameters)), np.zeros(parameters)
     sums = np.zeros(3)  # loss, noise gradient, noise information
-    classes = np.empty(4 * LARGEST_WINDOW, dtype=np.int64)
-    height, width = inverse_depth.shape
-    for b in range(bodies):
+    for b in range(view.lines.shape[0]):
         for edge in range(12):
-            if faces[b, edge] < 0:
-                continue
-            moment, force = np.zeros((3, 3)), np.zeros(3)
-            line, ends = lines[b, edge], all_ends[b, edge]
-            plane = solids[b, 4 + 3 * faces[b, edge] : 7 + 3 * faces[b, edge]]
-            rows = abs(line[0]) >= abs(line[1])  # one sample in each row, else in each column
-            along = 1 if rows else 0
-            across = 1 - along
-            first = max(0, math.ceil(min(ends[along], ends[2 + along])))
-            extent = height if rows else width
-            last = min(extent - 1, math.floor(max(ends[along], ends[2 + along])))
-            sharpness = max(noise, 1.0 / (last - first + 1)) if last >= first else noise
-            for a in range(first, last + 1):
-                position = -(line[along] * a + line[2]) / line[across]
-                u, v = (position, float(a)) if rows else (float(a), position)
-                at_edge = plane[0] * u + plane[1] * v + plane[2]
-                up = upwards[0] * u + upwards[1] * v + upwards[2]
-                if up / at_edge + upwards[3] < floor + settings.floor_margin or at_edge <= 0.0:
-                    continue
-                chord = _half_chord(lines[b], all_ends[b], faces[b], edge, a, position, rows)
-                start, step, count = _scan(
-                    solids, inverse_depth, settings, b, line, at_edge, a, position, rows,
-                    window, chord, classes,
+            if view.faces[b, edge] >= 0:
+                moment, force = np.zeros((3, 3)), np.zeros(3)
+                visible = _add_edge(
+                    view, image, settings, window, noise, depth_noise, border, most, b, edge,
+                    moment, force, sums,
                 )  # fmt: skip
-                if count == 0:
-                    continue
-                if noise == 0.0:
-                    weight = 9.0 / window**2
-                else:
-                    weight = 12.0 / (last - first + 1)
-                    _probit(
-                        line, start, step, a, rows, classes[:count], sharpness, settings.outliers,
-                        moment, force, sums,
-                    )  # fmt: skip
-                split = _split(classes[:count])
-                clipped = start <= 0 or start >= (width if rows else height) - 1
-                if split == 0 and clipped:
-                    continue
-                if 0 < split < count:
-                    found[b] += 1
-                else:
-                    lost[b] += 1
-                    if noise > 0.0:
-                        continue
-                    weight *= 0.25
-                at = start + step * (split - 0.5)
-                u, v = (at, float(a)) if rows else (float(a), at)
-                distance = line[0] * u + line[1] * v + line[2]
-                if noise == 0.0:
-                    weight /= 1.0 + (2.0 * distance / window) ** 2
-                sums[0] += 0.5 * weight * distance**2
-                _add(moment, force, weight, weight * distance, u, v)
-            slopes = view.line_slopes[b, edge]
-            add_normal_equations(hessian, gradient, slopes, moment, force)
-    return EdgeTerms(hessian, gradient, sums[0], sums[1], sums[2], found, lost)
+                slopes = view.line_slopes[b, edge]
+                add_normal_equations(hessian, gradient, slopes, moment, force)
+                if visible:
+                    add_normal_equations(information, unused, slopes, moment, force)
+    return EdgeTerms(hessian, gradient, information, sums[0], sums[1], sums[2])
 
 
 @njit(cache=True, error_model="numpy")
-def _scan(
-    solids: NDArray[np.float64],
-    inverse_depth: NDArray[np.float32],
+def _add_edge(
+    view: View,
+    image: Image,
     settings: EdgeSettings,
-    b: int,
-    line: NDArray[np.float64],
-    at_edge: float,
-    a: int,
-    position: float,
-    rows: bool,
     window: float,
-    chord: float,
-    classes: NDArray[np.int64],
-) -> tuple[int, int, int]:
-    """Classify the pixels of row (or column) ``a`` around an edge, from outside to inside.
-
-    Returns
-    -------
-    start, step, count
-        The outermost pixel, the step inwards (1 or -1) and the number of pixels.
-    """
-    slope = line[0] if rows else line[1]
-    step = 1 if slope > 0.0 else -1
-    reach = window / abs(slope)
-    inwards = min(reach, chord)
-    last = (inverse_depth.shape[1] if rows else inverse_depth.shape[0]) - 1
-    if step > 0:
-        start = max(math.ceil(position - reach), 0)
-        stop = min(math.floor(position + inwards), last)
-    else:
-        start = min(math.floor(position + reach), last)
-        stop = max(math.ceil(position - inwards), 0)
-    count = (stop - start) * step + 1
-    for k in range(count):
-        p = start + step * k
-        column, row = (p, a) if rows else (a, p)
-        expected, _ = meet(solids, b, float(column), float(row))
-        if expected == 0.0:
-            expected = at_edge
-        seen = float(inverse_depth[row, column])
-        classes[k] = _classify(solids, settings, b, float(column), float(row), seen, expected)
-    return start, step, max(count, 0)
-
-
-@njit(cache=True, error_model="numpy")
-def _half_chord(
-    lines: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edge: int,
-    a: int,
-    position: float,
-    rows: bool,
-) -> float:
-    """Return half the way along a row (or column) to the other side of the silhouette."""
-    along = 1 if rows else 0
-    step = 1.0 if lines[edge, 1 - along] > 0.0 else -1.0
-    nearest = np.inf
-    for other in range(12):
-        if other == edge or faces[other] < 0:
-            continue
-        low, high = ends[other, along], ends[other, 2 + along]
-        if min(low, high) <= a <= max(low, high):
-            slope = lines[other, 1 - along]
-            if abs(slope) > 1e-9:
-                at = -(lines[other, along] * a + lines[other, 2]) / slope
-                if (at - position) * step > 0.0:
-                    nearest = min(nearest, (at - position) * step)
-    return 0.5 * nearest
-
-
-@njit(cache=True, error_model="numpy")
-def _classify(
-    solids: NDArray[np.float64],
-    settings: EdgeSettings,
+    noise: float,
+    depth_noise: float,
+    border: float,
+    most: int,
     b: int,
-    u: float,
-    v: float,
-    seen: float,
-    expected: float,
-) -> int:
-    """Tell whether a pixel shows the body, at the inverse depth expected, or what is behind it."""
-    behind = 0.0
-    for other in range(solids.shape[0]):
-        if other != b:
-            met, _ = meet(solids, other, u, v)
-            if met > expected:
-                return UNKNOWN
-            behind = max(behind, met)
-    if seen == 0.0:
-        return BEHIND
-    depth = 1.0 / seen - 1.0 / expected
-    if depth < -settings.occluder:
-        return UNKNOWN
-    if behind > 0.0:
-        gap = 1.0 / behind - 1.0 / expected
-        if gap < settings.contrast:
-            return UNKNOWN
-        return BODY if depth < 0.5 * gap else BEHIND
-    return BODY if depth < settings.background else BEHIND
+    edge: int,
+    moment: NDArray[np.float64],
+    force: NDArray[np.float64],
+    sums: NDArray[np.float64],
+) -> bool:
+    """Add the samples of an edge, one in each row (or column); tell whether it is in view."""
+    solids, lines, all_ends, faces = view.solids, view.lines[b], view.ends[b], view.faces[b]
+    inverse_depth, upwards = image.inverse_depth, image.upwards
+    lowest = image.floor + settings.floor_margin
+    evidence = np.empty(4 * LARGEST_WINDOW)
+    line, ends = lines[edge], all_ends[edge]
+    plane = solids[b, 4 + 3 * faces[edge] : 7 + 3 * faces[edge]]
+    rows = abs(line[0]) >= abs(line[1])
+    along = 1 if rows else 0
+    extent, width = inverse_depth.shape[1 - along], inverse_depth.shape[along]
+    low, high = min(ends[along], ends[2 + along]), max(ends[along], ends[2 + along])
+    first = max(0, math.ceil(low + border))
+    last = min(extent - 1, math.floor(high - border))
+    samples = max(last - first + 1, 1)
+    sharpness = max(noise, 1.0 / samples)
+    seen, found = 0, 0
+    for a in range(first, last + 1, 1 + samples // most):
+        position = -(line[along] * a + line[2]) / line[1 - along]
+        u, v = (position, float(a)) if rows else (float(a), position)
+        at_edge = plane[0] * u + plane[1] * v + plane[2]
+        up = upwards[0] * u + upwards[1] * v + upwards[2]
+        if not image.farthest < at_edge < image.nearest or up / at_edge + upwards[3] < lowest:
+            continue
+        chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
+        start, step, count = scan(
+            solids, inverse_depth, settings, depth_noise, b, line[1 - along], at_edge, rows, a,
+            position, window, chord, evidence,
+        )  # fmt: skip
+        if count == 0:
+            continue
+        seen += 1
+        if noise > 0.0:
+            _add_probit(
+                line, start, step, a, rows, evidence[:count], sharpness,
+                _taper(a, low + border, high - border, border), moment, force, sums,
+            )  # fmt: skip
+        behind = split(evidence[:count])
+        has_step = 0 < behind < count
+        clipped = start == 0 or start == width - 1
+        if has_step:
+            found += 1
+        elif noise > 0.0 or (behind == 0 and clipped):
+            continue
+        at = start + step * (behind - 0.5)
+        u, v = (at, float(a)) if rows else (float(a), at)
+        distance = line[0] * u + line[1] * v + line[2]
+        if noise > 0.0:
+            weight = 12.0 / samples  # rows that are all cut alike fix an edge to a pixel, together
+        else:
+            weight = 9.0 / window**2 / (1.0 + (2.0 * distance / window) ** 2)
+            weight *= 1.0 if has_step else LOST
+        sums[0] += 0.5 * weight * distance**2
+        _add(moment, force, weight, weight * distance, u, v)
+    if noise > 0.0:
+        span = PHASES * (last - first) * abs(line[along] / line[1 - along])
+        rounding = 1.0 / (1.0 + moment[2, 2] / (12.0 * (1.0 + span**2)))
+        moment *= rounding
+        force *= rounding
+    return found > VISIBLE * seen
 
 
 @njit(cache=True, error_model="numpy")
-def _split(classes: NDArray[np.int64]) -> int:
-    """Return how many pixels, from outside, to put behind so that the fewest are wrong."""
-    cost = 0
-    for k in range(classes.shape[0]):
-        if classes[k] == BEHIND:
-            cost += 1
-    least, best = cost, 0
-    for k in range(classes.shape[0]):
-        cost += classes[k]
-        if cost < least:
-            least, best = cost, k + 1
-    return best
+def _taper(a: int, low: float, high: float, border: float) -> float:
+    """Return a weight that rises from 0 at the ends of an edge, so that no sample jumps."""
+    return min(1.0, (a - low) / border, (high - a) / border) if border > 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")
-def _probit(
+def _add_probit(
     line: NDArray[np.float64],
     start: int,
     step: int,
     a: int,
     rows: bool,
-    classes: NDArray[np.int64],
+    evidence: NDArray[np.float64],
     noise: float,
-    outliers: float,
+    weight: float,
     moment: NDArray[np.float64],
     force: NDArray[np.float64],
     sums: NDArray[np.float64],
 ) -> None:
     """Add the likelihood of the pixels of one row (or column)."""
-    for k in range(classes.shape[0]):
-        if classes[k] == UNKNOWN:
+    for k in range(evidence.shape[0]):
+        if evidence[k] == 0.0:
             continue
         p = float(start + step * k)
         u, v = (p, float(a)) if rows else (float(a), p)
-        sign = float(classes[k])
+        sign, sure = np.sign(evidence[k]), abs(evidence[k])
         t = sign * (line[0] * u + line[1] * v + line[2]) / noise
-        if t > 6.0:
+        if t > FAR:
             continue
-        likely = outliers + (1.0 - 2.0 * outliers) * 0.5 * math.erfc(-t * ROOT_HALF)
-        density = (1.0 - 2.0 * outliers) * math.exp(-0.5 * t * t) / ROOT_TWO_PI
+        likely = 1.0 - sure + (2.0 * sure - 1.0) * 0.5 * math.erfc(-t * ROOT_HALF)
+        density = (2.0 * sure - 1.0) * math.exp(-0.5 * t * t) / ROOT_TWO_PI
+        unlikely = 1.0 - likely
         push = density / likely
-        information = density * push / (1.0 - likely)
-        sums[0] -= math.log(likely)
-        sums[1] += t * push
-        sums[2] += t * t * information
-        _add(moment, force, information / noise**2, -sign * push / noise, u, v)
+        information = density * push / unlikely
+        sums[0] -= weight * math.log(likely)
+        sums[1] += weight * t * push
+        sums[2] += weight * t * t * information
+        _add(moment, force, weight * information / noise**2, -weight * sign * push / noise, u, v)
 
 
 @njit(cache=True, error_model="numpy")

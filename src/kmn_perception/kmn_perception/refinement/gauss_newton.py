@@ -7,42 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.capture import capture
 from kmn_perception.refinement.edges import EdgeTerms, edge_terms
-from kmn_perception.refinement.geometry import Shape, View, cuboids, view_of
-from kmn_perception.refinement.image import Image
-from kmn_perception.refinement.misfit import misfit
+from kmn_perception.refinement.geometry import View
 from kmn_perception.refinement.planes import PlaneTerms, plane_terms
-from kmn_perception.refinement.settings import RefinementSettings
+from kmn_perception.refinement.problem import Problem
+from kmn_perception.refinement.settings import SearchSettings
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
-
-
-class Problem(NamedTuple):
-    """What is fitted to what."""
-
-    shape: Shape
-    limits: NDArray[np.float64]  # (P, 2)
-    image: Image
-    settings: RefinementSettings
-
-    def view(self, values: NDArray[np.float64]) -> View:
-        """Return the model as the sensor sees it."""
-        return view_of(self.shape, values, self.image.projection)
-
-    def misfit(self, values: NDArray[np.float64]) -> float:
-        """Return the share of pixels that the model at ``values`` explains wrongly."""
-        settings = self.settings.misfit
-        return misfit(self.view(values), self.image, settings.pixels, settings.depth)
-
-    @property
-    def stride(self) -> int:
-        """Of the pixels whose depth is compared in one step."""
-        return max(1, len(self.image.pixels) // self.settings.depth_pixels)
-
-    @property
-    def steepness(self) -> float:
-        """Inverse depth per metre at the object's distance, 1 / m^2."""
-        return float(np.mean(self.image.pixels[:: self.stride, 2])) ** 2
+COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations
+ALL = 10**6  # samples of an edge
+SWING = 6  # after as many steps they are halved, lest they swing to and fro
+TENTH = 0.1  # pixels, and of the noise: what is less has settled
 
 
 class Noise(NamedTuple):
@@ -64,49 +40,95 @@ class Fit(NamedTuple):
 
 def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     """Fit from a start: a coarse search that narrows, then down to the noise of the sensor."""
-    steps = 0
-    for level in problem.settings.search:
-        deviation = level.depth / 3.0 * problem.steepness
-        for _ in range(level.steps):
-            view = problem.view(values)
-            planes = plane_terms(view, problem.image.pixels, problem.stride, 3.0 * deviation)
-            edges = edge_terms(view, problem.image, problem.settings.edges, level.window, 0.0)
-            values, _ = _step(problem, values, planes, edges, deviation)
-            steps += 1
+    search = problem.settings.search
+    for level in search:
+        values = _search(problem, values, level)
+    caught = capture(
+        problem.shape, problem.image, problem.limits, values, *problem.settings.capture
+    )
+    steps = sum(level.steps for level in search)
+    if caught is not values:
+        values = _search(problem, caught, search[-1])
+        steps += search[-1].steps
     return _fit_finely(problem, values, steps)
 
 
-def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fit:
-    settings = problem.settings.fine
-    lateral = settings.noise
-    least = settings.least_depth_noise * problem.steepness
-    depth = problem.settings.search[-1].depth / 3.0 * problem.steepness
-    stride = problem.stride
-    for _ in range(settings.steps):
+def _search(
+    problem: Problem, values: NDArray[np.float64], level: SearchSettings
+) -> NDArray[np.float64]:
+    """Take the steps of one level of the coarse search."""
+    stride = problem.stride(problem.settings.depth_pixels)
+    noise = level.depth / COARSE * problem.steepness
+    for _ in range(level.steps):
         view = problem.view(values)
-        planes = plane_terms(view, problem.image.pixels, stride, settings.robust * depth)
-        if len(planes.residuals):
-            depth = max(least, MEDIAN_TO_SIGMA * float(np.median(np.abs(planes.residuals))))
-        edges = fine_edges(problem, view, lateral)
-        depth_information = stride * planes.hessian / depth**2
-        values, moved = _step(problem, values, planes, edges, depth / np.sqrt(stride))
-        steps += 1
-        change = -edges.noise_gradient / max(edges.noise_information, 1.0)
-        sharper = lateral * float(np.exp(np.clip(change, -0.7, 0.7)))
-        settled = abs(np.log(max(sharper, settings.least_noise) / lateral)) < 0.02
-        lateral = min(max(sharper, settings.least_noise), settings.noise)
-        if moved < settings.tolerance and settled:
-            if stride == 1 or depth == least:
+        planes = plane_terms(view, problem.image, stride, noise, 0.0, COARSE, 0.0)
+        edges = edge_terms(
+            view,
+            problem.image,
+            problem.settings.edges,
+            level.window,
+            0.0,
+            noise / COARSE,
+            0.0,
+            level.samples,
+        )
+        values = problem.kept(values + _step(problem, values, planes, edges)[0])
+    return values
+
+
+def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fit:
+    """Fit to the noise of the sensor, which is estimated as well."""
+    settings = problem.settings.fine
+    least = Noise(settings.least_depth_noise * problem.steepness, settings.least_noise)
+    depth = problem.settings.search[-1].depth / COARSE * problem.steepness
+    noise = Noise(depth, settings.noise)
+    for pixels in (problem.settings.depth_pixels, settings.depth_pixels):
+        stride = problem.stride(pixels)
+        for k in range(settings.steps):
+            view = problem.view(values)
+            planes = plane_terms(
+                view, problem.image, stride, *noise, settings.robust, settings.border * noise[1]
+            )
+            edges = fine_edges(problem, view, noise, settings.border)
+            step, moved = _step(problem, values, planes, edges)
+            values = problem.kept(values + step / (1 + k // SWING))
+            steps += 1
+            before = noise
+            noise = _estimate_noise(noise, least, planes, edges, settings.noise)
+            change = np.abs(np.log(np.divide(noise, before))).max()
+            if moved < settings.tolerance * max(noise.lateral, TENTH) and change < TENTH:
                 break
-            stride = 1
-    return Fit(values, Noise(depth, lateral), depth_information, edges.hessian, steps)
+        if noise.depth == least.depth:
+            break  # exact depths: more of them tell nothing new
+    return Fit(values, before, planes.hessian, edges.information, steps)
 
 
-def fine_edges(problem: Problem, view: View, lateral: float) -> EdgeTerms:
-    """Return the likelihood of the pixels beside the edges at a lateral noise in pixels."""
+def _estimate_noise(
+    noise: Noise, least: Noise, planes: PlaneTerms, edges: EdgeTerms, most: float
+) -> Noise:
+    """Return the noise that is likely, given what was found with the noise assumed."""
+    depth = noise.depth
+    if len(planes.residuals):
+        depth *= MEDIAN_TO_SIGMA * float(np.median(np.abs(planes.residuals)))
+    change = -edges.noise_gradient / max(edges.noise_information, 1.0)
+    lateral = noise.lateral * float(np.exp(np.clip(change, -0.7, 0.7)))
+    return Noise(max(depth, least.depth), min(max(lateral, least.lateral), most))
+
+
+def fine_edges(problem: Problem, view: View, noise: Noise, border: float) -> EdgeTerms:
+    """Return the likelihood of the pixels beside the edges, but ``border`` s from their ends."""
     fine = problem.settings.fine
-    window = max(fine.least_window, fine.window * lateral)
-    return edge_terms(view, problem.image, problem.settings.edges, window, lateral)
+    window = max(fine.least_window, fine.window * noise.lateral)
+    return edge_terms(
+        view,
+        problem.image,
+        problem.settings.edges,
+        window,
+        noise.lateral,
+        noise.depth,
+        border * noise.lateral,
+        ALL,
+    )
 
 
 def _step(
@@ -114,26 +136,17 @@ def _step(
     values: NDArray[np.float64],
     planes: PlaneTerms,
     edges: EdgeTerms,
-    depth_noise: float,
 ) -> tuple[NDArray[np.float64], float]:
-    """Take a damped step; also return by how many pixels it moves the object."""
-    hessian = planes.hessian / depth_noise**2 + edges.hessian
-    gradient = planes.gradient / depth_noise**2 + edges.gradient
-    centre, half = problem.limits.mean(axis=1), np.ptp(problem.limits, axis=1) / 2.0
-    softness = problem.settings.limit_softness * half
-    beyond = values - np.clip(values, centre - half, centre + half)
-    hessian = hessian + np.diag((beyond != 0.0) / softness**2)
-    gradient = gradient + beyond / softness**2
-    pixels = pixels_per_unit(problem, values)
-    damped = hessian + problem.settings.damping * np.diag(pixels**2)
+    """Return a damped step, and by how many pixels it moves the object."""
+    hessian = planes.hessian + edges.hessian
+    gradient = planes.gradient + edges.gradient
+    low, high = problem.limits.T
+    softness = problem.settings.limit_softness * problem.half_range
+    beyond = values - np.minimum(np.maximum(values, low), high)
+    pixels = problem.pixels_per_unit(values)
+    damping = (beyond != 0.0) / softness**2 + problem.settings.damping * pixels**2
+    damped = hessian + np.diag(damping)
+    gradient += beyond / softness**2
     scale = 1.0 / np.sqrt(np.diag(damped))
     step = -scale * np.linalg.solve(damped * np.outer(scale, scale), scale * gradient)
-    return values + step, float(np.abs(step * pixels).max())
-
-
-def pixels_per_unit(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return by about how many pixels each parameter (P,) moves the object's surface."""
-    _, slopes = cuboids(problem.shape, values)
-    corners = 0.25 * (slopes[:, :, :3] ** 2).sum(axis=(1, 2)) + (slopes[:, :, 3] ** 2).sum(axis=1)
-    focal_length = np.linalg.norm(problem.image.projection[0, :3])
-    return np.sqrt(corners.max(axis=0) * problem.steepness) * focal_length + 1e-12
+    return step, float(np.abs(step * pixels).max())

@@ -1,7 +1,7 @@
 """Cuboids as a camera sees them, and how they move with the morphing parameters.
 
-All that is seen is written in homogeneous pixels P = z (u, v, 1), which the camera matrix K makes of
-the optical frame. A plane is a vector q with q . P = 1, so that its inverse depth at a pixel is
+All that is seen is written in homogeneous pixels P = z (u, v, 1), which the camera matrix K makes
+of the optical frame. A plane is a vector q with q . P = 1, so that its inverse depth at a pixel is
 q . (u, v, 1), and the image of a straight edge is a line l with l . (u, v, 1) = 0.
 """
 
@@ -57,7 +57,7 @@ def shape_of(model: KinematicModel) -> Shape:
 
 
 def unit_cubes_jacobian(model: KinematicModel, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivative (B, 4, 4, n + m) of ``KinematicModel.unit_cubes`` at (n + m,) values."""
+    """Return the derivative (B, 4, 4, n + m) of ``KinematicModel.unit_cubes`` at some values."""
     _, slopes = cuboids(shape_of(model), values)
     return np.concatenate([slopes, np.zeros_like(slopes[:, :1])], axis=1)
 

@@ -12,6 +12,7 @@ from kmn_perception.observation import Observation
 from kmn_perception.refinement.geometry import projection
 
 HALF = 0.5
+LEAST_RANGE = 1e-6  # metres
 
 
 class Image(NamedTuple):
@@ -30,6 +31,8 @@ class Image(NamedTuple):
         upwards[3]``.
     floor
         Height in metres up to which points were lost.
+    nearest, farthest
+        Inverse depths between which the sensor measures, 1 / m.
     """
 
     inverse_depth: NDArray[np.float32]
@@ -37,6 +40,8 @@ class Image(NamedTuple):
     projection: NDArray[np.float64]
     upwards: NDArray[np.float64]
     floor: float
+    nearest: float
+    farthest: float
 
 
 def image_of(observation: Observation) -> Image:
@@ -47,7 +52,15 @@ def image_of(observation: Observation) -> Image:
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
-    return Image(inverse_depth, pixels, matrix, upwards, float(observation.floor))
+    return Image(
+        inverse_depth,
+        pixels,
+        matrix,
+        upwards,
+        float(observation.floor),
+        1.0 / max(camera.near, LEAST_RANGE),
+        1.0 / camera.far,
+    )
 
 
 @njit(cache=True)
@@ -57,7 +70,7 @@ def _splat(
     matrix: NDArray[np.float64],
     near: float,
 ) -> NDArray[np.float32]:
-    """Keep the nearest point of each pixel; return the pixels that were hit, in the points' order."""
+    """Keep the nearest point of each pixel; return the pixels hit, in the points' order."""
     height, width = inverse_depth.shape
     pixels = np.empty((points.shape[0], 3), dtype=np.float32)
     count = 0

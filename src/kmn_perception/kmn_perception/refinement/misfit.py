@@ -4,42 +4,69 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import View, meet_any
 from kmn_perception.refinement.image import Image
+
+DIGITS = 6  # of the share; less is the rounding of the points
 
 
 @njit(cache=True, error_model="numpy")
 def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
     """Return the share of pixels that the model explains wrongly.
 
-    On a regular grid, a pixel that shows something where the model has nothing, or the other way
-    round, counts 1, and a wrong depth its square, up to 1; the sum is divided by the number of pixels seen.
+    A pixel that shows something where the model has nothing, or the other way round, counts 1, and
+    a wrong depth its square, up to 1; the sum is divided by the number of pixels seen. Where the
+    model is out of the sensor's range, nothing need be seen.
 
     Parameters
     ----------
     count
-        About this many of the observed pixels lie on the grid.
+        About this many of the pixels seen are looked at, and of those that show nothing though the
+        model is there.
     depth_scale
         Difference in depth that counts as 1, metres.
     """
-    solids, inverse_depth, pixels = view.solids, image.inverse_depth, image.pixels
-    up, base, floor = image.upwards, image.upwards[3], image.floor
+    pixels = image.pixels
+    stride = max(1, pixels.shape[0] // count)
+    wrong, looked = 0.0, 0
+    for i in range(0, pixels.shape[0], stride):
+        u, v, observed = float(pixels[i, 0]), float(pixels[i, 1]), float(pixels[i, 2])
+        predicted = _predicted(view.solids, image, u, v)
+        looked += 1
+        if predicted > 0.0:
+            wrong += min(1.0, ((1.0 / observed - 1.0 / predicted) / depth_scale) ** 2)
+        else:
+            wrong += 1.0
+    unseen = _unseen(view.solids, image, count) / max(pixels.shape[0], 1)
+    return round(wrong / max(looked, 1) + unseen, DIGITS)
+
+
+@njit(cache=True, error_model="numpy")
+def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
+    """Return the number of pixels that show nothing, though the model is there."""
+    inverse_depth = image.inverse_depth
     height, width = inverse_depth.shape
-    step = max(1, int(np.sqrt(pixels.shape[0] / count)))
-    wrong, seen = 0.0, 0
-    for row in range(step // 2, height, step):
-        for column in range(step // 2, width, step):
-            observed = float(inverse_depth[row, column])
-            predicted, _, _ = meet_any(solids, float(column), float(row))
-            if predicted > 0.0:
-                high = (up[0] * column + up[1] * row + up[2]) / predicted + base
-                if high < floor:
-                    predicted = 0.0
-            if observed > 0.0:
-                seen += 1
-            if observed > 0.0 and predicted > 0.0:
-                wrong += min(1.0, ((1.0 / observed - 1.0 / predicted) / depth_scale) ** 2)
-            elif observed > 0.0 or predicted > 0.0:
-                wrong += 1.0
-    return wrong / max(seen, 1)
+    left, right = max(solids[:, 0].min(), 0.0), min(solids[:, 1].max(), width - 1.0)
+    top, bottom = max(solids[:, 2].min(), 0.0), min(solids[:, 3].max(), height - 1.0)
+    if left > right or top > bottom:
+        return 0.0
+    step = max(1, int(np.sqrt((right - left + 1.0) * (bottom - top + 1.0) / count)))
+    unseen = 0
+    for row in range(int(np.ceil(top)), int(bottom) + 1, step):
+        for column in range(int(np.ceil(left)), int(right) + 1, step):
+            if inverse_depth[row, column] == 0.0:
+                unseen += _predicted(solids, image, float(column), float(row)) > 0.0
+    return float(unseen * step**2)
+
+
+@njit(cache=True, error_model="numpy")
+def _predicted(solids: NDArray[np.float64], image: Image, u: float, v: float) -> float:
+    """Return the inverse depth at which a pixel should show the model, 0 if it should not."""
+    predicted, _, _ = meet_any(solids, u, v)
+    if predicted < image.farthest or predicted > image.nearest:
+        return 0.0
+    up = image.upwards
+    height = (up[0] * u + up[1] * v + up[2]) / predicted + up[3]
+    return predicted if height >= image.floor else 0.0

@@ -1,4 +1,4 @@
-"""The best fit of a kinematic model to an observation, from the network's estimate or without it."""
+"""The best fit of a model to an observation, from the network's estimate or without it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation
 from kmn_perception.refinement.covariance import with_covariance
-from kmn_perception.refinement.gauss_newton import Fit, Problem, fit
-from kmn_perception.refinement.geometry import shape_of
-from kmn_perception.refinement.image import image_of
+from kmn_perception.refinement.gauss_newton import Fit, fit
+from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.settings import RefinementSettings
 
 SCAN = 9  # values of each parameter that are tried, within its limits
 YAWS = 9
+AT_THE_FIT = 10.0  # squared distance for each parameter, at which a start is as good as the fit
 
 
 class Refinement(NamedTuple):
@@ -31,7 +31,8 @@ class Refinement(NamedTuple):
     iterations
         Steps that were taken.
     improved
-        The misfit is not larger than that of the start; else the start is returned.
+        The misfit is not larger than that of the start. Else the start is returned, with the fit's
+        covariance where the start agrees with the fit, and with that of the limits where not.
     reason
         Why the result is not to be trusted; empty when it is fine.
     """
@@ -54,7 +55,7 @@ def refine(
 
     The result is never worse than the start by the common misfit.
     """
-    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    problem = Problem.of(model, observation, settings)
     values = np.asarray(values, dtype=np.float64)
     count = len(problem.image.pixels)
     if count < settings.min_points:
@@ -69,7 +70,7 @@ def refine_from_scratch(
     model: KinematicModel, observation: Observation, settings: RefinementSettings
 ) -> Refinement:
     """Fit (theta, gamma) to an observation without any estimate: from several starts."""
-    problem = Problem(shape_of(model), model.limits, image_of(observation), settings)
+    problem = Problem.of(model, observation, settings)
     start = _above_centroid(model, observation)
     count = len(problem.image.pixels)
     if count < settings.min_points:
@@ -97,15 +98,22 @@ def _refined(
             iterations += candidate.steps
             if candidate_misfit < misfit:
                 best, misfit = candidate, candidate_misfit
-    values, covariance = with_covariance(problem, best)
+    if misfit > settings.wrong:
+        values, covariance = best.values, _within_limits(model)
+    else:
+        values, covariance = with_covariance(problem, best)
     misfit, before = problem.misfit(values), problem.misfit(start)
-    if not misfit <= before:
-        reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
-        return _unrefined(model, start, before, iterations, reason)
+    improved = misfit <= before
+    if not improved:
+        error = start - values
+        if error @ np.linalg.pinv(covariance, hermitian=True) @ error > AT_THE_FIT * len(error):
+            reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
+            return _unrefined(model, start, before, iterations, reason)
+        values, misfit = start, before
     reason = ""
     if misfit > settings.wrong:
         reason = f"the model explains {misfit:.0%} of the observation wrongly"
-    return Refinement(values, covariance, misfit, iterations, True, reason)
+    return Refinement(values, covariance, misfit, iterations, improved, reason)
 
 
 def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit, float]:
@@ -116,9 +124,13 @@ def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit
 def _unrefined(
     model: KinematicModel, values: NDArray[np.float64], misfit: float, iterations: int, reason: str
 ) -> Refinement:
-    """Return the start; where it lies within the limits is not known."""
-    covariance = np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
-    return Refinement(values, covariance, misfit, iterations, False, reason)
+    """Return the start."""
+    return Refinement(values, _within_limits(model), misfit, iterations, False, reason)
+
+
+def _within_limits(model: KinematicModel) -> NDArray[np.float64]:
+    """Return the covariance (P, P) of values of which no more is known than the limits."""
+    return np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
 
 
 def _scan(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -151,5 +163,5 @@ def _turned(model: KinematicModel, values: NDArray[np.float64]) -> list[NDArray[
         return [values]
     yaw = model.transformation.kinds.index(("rotation", "z"))
     starts = np.repeat(values[None], YAWS, axis=0)
-    starts[:, yaw] = np.linspace(*model.limits[yaw], YAWS)
+    starts[:, yaw] = np.linspace(model.limits[yaw, 0], model.limits[yaw, 1], YAWS)
     return list(starts)

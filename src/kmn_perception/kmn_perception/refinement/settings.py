@@ -4,19 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from kmn_perception import resources
 from kmn_perception.configuration import Section
-from kmn_perception.refinement.edges import LARGEST_WINDOW, EdgeSettings
+from kmn_perception.refinement.edges import LARGEST_WINDOW
+from kmn_perception.refinement.silhouette import EdgeSettings
 
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """A level of the coarse search: window in pixels, robust depth in metres, number of steps."""
+    """A level of the coarse search.
+
+    Attributes
+    ----------
+    window
+        Pixels to either side in which an edge is sought.
+    depth
+        Larger differences in depth are ignored, metres.
+    steps
+        Of Gauss-Newton.
+    samples
+        Of each edge.
+    """
 
     window: float
     depth: float
     steps: int
+    samples: int
+
+
+class CaptureSettings(NamedTuple):
+    """The search for a lost body: size of the grid, and the support that is enough without it."""
+
+    tries: int
+    enough: float
 
 
 @dataclass(frozen=True)
@@ -26,7 +48,9 @@ class FineSettings:
     Attributes
     ----------
     steps
-        Largest number of steps.
+        Largest number of steps with few, and again with many pixels.
+    depth_pixels
+        Number of observed pixels whose depth is compared in the last steps.
     noise, least_noise
         Lateral noise at the start and at least, pixels.
     window, least_window
@@ -35,17 +59,22 @@ class FineSettings:
         Metres.
     robust
         Depths beyond this lose their weight, in units of their noise.
+    border
+        Pixels nearer than this to the rim of a face or image are left out, in units of the lateral
+        noise.
     tolerance
-        A smaller step is the last, pixels.
+        A smaller step is the last, in units of the lateral noise (but at least of 0.1 pixels).
     """
 
     steps: int
+    depth_pixels: int
     noise: float
     least_noise: float
     window: float
     least_window: float
     least_depth_noise: float
     robust: float
+    border: float
     tolerance: float
 
 
@@ -79,12 +108,14 @@ class RefinementSettings:
         Fewer points are not refined.
     depth_pixels
         Number of observed pixels whose depth is compared in one step.
-    search, fine, edges, misfit
+    search, capture, fine, edges, misfit
         Of the parts.
     starts
         From so many starts the model is fitted where there is no estimate.
     damping
         Information that every squared pixel of movement is taken to cost.
+    limit_margin
+        By how much of its range a parameter may lie beyond its limits.
     limit_softness
         Standard deviation beyond the limits, as a share of half the range.
     weak
@@ -96,10 +127,12 @@ class RefinementSettings:
     min_points: int
     depth_pixels: int
     search: tuple[SearchSettings, ...]
+    capture: CaptureSettings
     fine: FineSettings
     edges: EdgeSettings
     starts: int
     damping: float
+    limit_margin: float
     limit_softness: float
     misfit: MisfitSettings
     weak: float
@@ -112,18 +145,20 @@ class RefinementSettings:
         section = Section.load(file)
         section.allow(
             (
-                "min_points", "depth_pixels", "search", "fine", "edges", "starts", "damping",
-                "limit_softness", "misfit", "weak", "segment_rise",
+                "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts",
+                "damping", "limit_margin", "limit_softness", "misfit", "weak", "segment_rise",
             )
         )  # fmt: skip
         return cls(
             min_points=section.whole_number("min_points", 1, 10**6),
             depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
             search=tuple(_search(entry) for entry in section.sections("search")),
+            capture=_capture(section.section("capture")),
             fine=_fine(section.section("fine")),
             edges=_edges(section.section("edges")),
             starts=section.whole_number("starts", 1, 100),
             damping=section.number("damping", 0.0, 1e6),
+            limit_margin=section.number("limit_margin", 0.0, 10.0),
             limit_softness=section.number("limit_softness", 1e-6, 1.0),
             misfit=_misfit(section.section("misfit")),
             weak=section.number("weak", 0.0, 1.0),
@@ -132,29 +167,39 @@ class RefinementSettings:
 
 
 def _search(section: Section) -> SearchSettings:
-    section.allow(("window", "depth", "steps"))
+    section.allow(("window", "depth", "steps", "samples"))
     return SearchSettings(
         section.number("window", 1.0, LARGEST_WINDOW),
         section.number("depth", 1e-6, 1e3),
         section.whole_number("steps", 0, 100),
+        section.whole_number("samples", 1, 10**6),
+    )
+
+
+def _capture(section: Section) -> CaptureSettings:
+    section.allow(("tries", "enough"))
+    return CaptureSettings(
+        section.whole_number("tries", 1, 10**5), section.number("enough", -1.0, 1.0)
     )
 
 
 def _fine(section: Section) -> FineSettings:
     section.allow(
         (
-            "steps", "noise", "least_noise", "window", "least_window", "least_depth_noise",
-            "robust", "tolerance",
+            "steps", "depth_pixels", "noise", "least_noise", "window", "least_window",
+            "least_depth_noise", "robust", "border", "tolerance",
         )
     )  # fmt: skip
     return FineSettings(
         steps=section.whole_number("steps", 1, 1000),
+        depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
         noise=section.number("noise", 1e-6, LARGEST_WINDOW / 4),
         least_noise=section.number("least_noise", 1e-6, 1.0),
         window=section.number("window", 1.0, 10.0),
         least_window=section.number("least_window", 1.0, LARGEST_WINDOW),
         least_depth_noise=section.number("least_depth_noise", 1e-9, 1.0),
         robust=section.number("robust", 1.0, 100.0),
+        border=section.number("border", 0.0, 10.0),
         tolerance=section.number("tolerance", 0.0, 1.0),
     )
 

@@ -110,7 +110,9 @@ class StagewiseTraining(Training):
         estimates = [values]
         for _ in range(self.copies - 1):
             factor = generator.uniform(0.0, self.stagewise.spread, size=(len(errors), 1))
-            estimates.append(truth + factor * generator.permutation(errors))
+            shuffled = truth + factor * generator.permutation(errors)
+            # As the network's own estimates, within the bounds where bodies have a size.
+            estimates.append(self.network.concatenate(shuffled, np.zeros_like(shuffled)))
         return estimates
 
     def fitted(self) -> Stage:

@@ -1,0 +1,58 @@
+"""How much of an object lies inside a sensor's image."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.camera import Camera
+from kmn_perception.rendering import render
+
+CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, 8)
+REACH = 4.0  # images; the view is unlimited but for what lies farther beside the sensor's image
+
+
+def visible_fraction(unit_cubes: NDArray[np.float64], camera: Camera) -> float:
+    """Return the share of an object's silhouette that lies inside the image, in pixels.
+
+    Parameters
+    ----------
+    unit_cubes
+        (B, 4, 4) maps of the unit cube to the world, as from ``KinematicModel.unit_cubes``.
+    """
+    left, right, top, bottom = _beyond_the_image(unit_cubes, camera)
+    if not (left or right or top or bottom):
+        return 1.0
+    enlarged = replace(
+        camera,
+        width=left + camera.width + right,
+        height=top + camera.height + bottom,
+        cx=camera.cx + left,
+        cy=camera.cy + top,
+    )
+    silhouette = np.isfinite(render(unit_cubes, enlarged))
+    inside = silhouette[top : top + camera.height, left : left + camera.width]
+    return float(inside.sum() / silhouette.sum())
+
+
+def _beyond_the_image(unit_cubes: NDArray[np.float64], camera: Camera) -> tuple[int, int, int, int]:
+    """Return how far the cubes reach beyond the image: left, right, up, down, in pixels."""
+    to_camera = camera.world_to_camera @ unit_cubes
+    x, y, z = np.moveaxis(to_camera[:, :3, :3] @ CORNERS + to_camera[:, :3, 3:], 1, 0)
+    most = int(REACH * camera.width), int(REACH * camera.height)
+    if z.min() <= camera.near:
+        return most[0], most[0], most[1], most[1]
+    u, v = x / z * camera.fx + camera.cx, y / z * camera.fy + camera.cy
+    beyond = -u.min(), u.max() - (camera.width - 1), -v.min(), v.max() - (camera.height - 1)
+    return (
+        _pixels(beyond[0], most[0]),
+        _pixels(beyond[1], most[0]),
+        _pixels(beyond[2], most[1]),
+        _pixels(beyond[3], most[1]),
+    )
+
+
+def _pixels(distance: float, most: int) -> int:
+    return min(max(0, int(np.ceil(distance))), most)

@@ -1,0 +1,74 @@
+"""What is fitted to what, and how well it fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.observation import Observation
+from kmn_perception.refinement.geometry import Shape, View, cuboids, shape_of, view_of
+from kmn_perception.refinement.image import Image, image_of
+from kmn_perception.refinement.misfit import misfit
+from kmn_perception.refinement.settings import RefinementSettings
+
+SOME = 1000  # pixels that tell the object's distance
+LEAST_MOVEMENT = 1e-12  # pixels per unit
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A model, its P parameters' limits (P, 2), and an observation of it."""
+
+    shape: Shape
+    limits: NDArray[np.float64]
+    image: Image
+    settings: RefinementSettings
+
+    @classmethod
+    def of(
+        cls, model: KinematicModel, observation: Observation, settings: RefinementSettings
+    ) -> Problem:
+        """Return the problem of fitting a model to an observation."""
+        return cls(shape_of(model), model.limits, image_of(observation), settings)
+
+    @cached_property
+    def half_range(self) -> NDArray[np.float64]:
+        """(P,) half the distance between the limits."""
+        return 0.5 * (self.limits[:, 1] - self.limits[:, 0])
+
+    @cached_property
+    def steepness(self) -> float:
+        """Inverse depth per metre at the object's distance, 1 / m^2."""
+        return float(np.mean(self.image.pixels[:: self.stride(SOME), 2])) ** 2
+
+    def stride(self, pixels: int) -> int:
+        """Return which of the observed pixels to take, so that there are about so many."""
+        return max(1, round(len(self.image.pixels) / pixels))
+
+    def view(self, values: NDArray[np.float64]) -> View:
+        """Return the model at ``values`` (P,) as the sensor sees it."""
+        return view_of(self.shape, values, self.image.projection)
+
+    def misfit(self, values: NDArray[np.float64]) -> float:
+        """Return the share of pixels that the model at ``values`` explains wrongly."""
+        settings = self.settings.misfit
+        return misfit(self.view(values), self.image, settings.pixels, settings.depth)
+
+    def kept(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values kept within the limits, and a margin beside them."""
+        margin = 2.0 * self.settings.limit_margin * self.half_range
+        return np.minimum(
+            np.maximum(values, self.limits[:, 0] - margin), self.limits[:, 1] + margin
+        )
+
+    def pixels_per_unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return by about how many pixels each parameter (P,) moves the object's surface."""
+        _, slopes = cuboids(self.shape, values)
+        squares = slopes**2
+        corners = 0.25 * squares[:, :, :3].sum(axis=(1, 2)) + squares[:, :, 3].sum(axis=1)
+        focal_length = np.linalg.norm(self.image.projection[0, :3])
+        return np.sqrt(corners.max(axis=0) * self.steepness) * focal_length + LEAST_MOVEMENT

@@ -140,7 +140,11 @@ def live_scenes(model: KinematicModel, name: str, noise: str, seed: int) -> Iter
         Of the simulated sensor.
     """
     alone = f"__ns:=/sim_{os.getpid()}"  # whatever else runs here is not disturbed
-    sim: dict[str, Any] = {"model": name, "placement": "given", "values": [0.0] * len(model.parameters)}
+    sim: dict[str, Any] = {
+        "model": name,
+        "placement": "given",
+        "values": [0.0] * len(model.parameters),
+    }
     sim |= {"noise": noise, "seed": seed, "camera_rate": CAMERA_RATE}
     morph = {"model": name, "reliability": "reliable"}
     with ExitStack() as stack:

@@ -120,8 +120,9 @@ class Runner:
         for task in self._tasks:
             if simulation.time < task.due:
                 continue
-            # On the grid of its period, so that its rate is kept on average.
-            task.due = (simulation.time // task.period + 1.0) * task.period
+            task.due += task.period  # so that its rate is kept on average
+            if task.due < simulation.time:
+                task.due = simulation.time + task.period
             try:
                 task.work(simulation)
             except Exception as error:

@@ -1,0 +1,252 @@
+"""sim_node moves the robot, refuses bad trajectories, shows depth, and changes its world."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.messages import camera_from_info, depth_from_image, points_from_cloud
+from kmn_perception.rendering import depth_to_points, render
+
+pytest.importorskip("pybullet")
+from kmn_sim.messages import seconds, stamp_of  # noqa: E402
+from kmn_sim.sim_node import SimNode  # noqa: E402
+
+ARM = ["l_shoulder_pan_joint", "l_elbow_flex_joint"]
+
+
+class SimClient(Node):
+    """Commands sim_node and keeps what it publishes."""
+
+    def __init__(self, graph: Any) -> None:
+        super().__init__("sim_client", context=graph.context)
+        self.graph = graph
+        self.joints: list[JointState] = []
+        self.doors: list[JointState] = []
+        self.truths: list[MorphingParameters] = []
+        self.images: list[Image] = []
+        self.infos: list[CameraInfo] = []
+        self.clouds: list[PointCloud2] = []
+        self.clocks: list[Clock] = []
+        self.reports: list[dict[str, str]] = []
+        for kind, name, kept in (
+            (JointState, "joint_states", self.joints),
+            (JointState, "door_state", self.doors),
+            (MorphingParameters, "ground_truth", self.truths),
+            (Clock, "/clock", self.clocks),
+        ):
+            self.create_subscription(kind, name, kept.append, 100)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._keep_report, 10)
+        self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
+        self.reset = self.create_client(Trigger, "reset")
+        self.setting = self.create_client(
+            SetParametersAtomically, "sim_node/set_parameters_atomically"
+        )
+
+    def _keep_report(self, report: DiagnosticArray) -> None:
+        self.reports.append({v.key: v.value for status in report.status for v in status.values})
+
+    def call(self, service: Any, request: Any) -> Any:
+        future = service.call_async(request)
+        self.graph.wait_for(future.done)
+        return future.result()
+
+    def set(self, **values: Any) -> SetParametersResult:
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
+        )
+        return self.call(self.setting, request).result
+
+    def report(self) -> dict[str, str]:
+        self.reports.clear()
+        return self.graph.wait_for(lambda: self.reports)[-1]
+
+    def position(self, joint: str) -> float:
+        state = self.joints[-1]
+        return float(state.position[list(state.name).index(joint)])
+
+    def wait_until_at(self, joint: str, position: float) -> None:
+        self.graph.wait_for(lambda: abs(self.position(joint) - position) < 0.01)
+
+
+@pytest.fixture(scope="module")
+def sim(graph: Any) -> SimNode:
+    overrides = [
+        Parameter("real_time_factor", value=0.0),
+        Parameter("publish_clock", value=True),
+        Parameter("placement", value="random"),
+    ]
+    return graph.start(SimNode, parameter_overrides=overrides)
+
+
+@pytest.fixture
+def client(graph: Any, sim: SimNode) -> Iterator[SimClient]:
+    made = graph.start(lambda **_: SimClient(graph))
+    made.graph.wait_for(made.trajectory.get_subscription_count)
+    made.setting.wait_for_service()
+    made.graph.wait_for(lambda: made.joints and made.reports and made.truths)
+    yield made
+    assert made.call(made.reset, Trigger.Request()).success
+
+
+def trajectory(*points: tuple[float, float, float], names: Any = ARM) -> JointTrajectory:
+    """Return a trajectory of points (time, pan, elbow)."""
+    message = JointTrajectory(joint_names=list(names))
+    for at, *positions in points:
+        point = JointTrajectoryPoint(positions=positions)
+        point.time_from_start.sec, point.time_from_start.nanosec = int(at), int(at % 1 * 1e9)
+        message.points.append(point)
+    return message
+
+
+def test_a_trajectory_moves_the_robot(client: SimClient) -> None:
+    client.trajectory.publish(trajectory((1.0, 0.5, -1.0), (2.0, 0.2, -0.8)))
+    client.wait_until_at(ARM[0], 0.2)
+    client.wait_until_at(ARM[1], -0.8)
+    state = client.joints[-1]
+    assert len(state.name) == len(state.position) == len(state.velocity) == len(state.effort) == 11
+    report = client.report()
+    assert float(report["progress"]) > 0.5
+    assert float(report["error_l_elbow_flex_joint"]) < 0.02
+
+
+def test_a_start_in_the_future_is_waited_for(client: SimClient) -> None:
+    now = seconds(client.joints[-1].header.stamp)
+    message = trajectory((0.5, 0.0, -1.0))
+    message.header.stamp = stamp_of(now + 3.0)
+    client.trajectory.publish(message)
+    client.wait_until_at(ARM[0], 0.0)
+    moved = [
+        seconds(s.header.stamp)
+        for s in client.joints
+        if s.position[list(s.name).index(ARM[0])] < 0.9
+    ]
+    assert moved[0] > now + 2.9
+
+
+BAD = {
+    "unknown_joint": trajectory((1.0, 0.0, -1.0), names=["l_shoulder_pan_joint", "nose"]),
+    "lengths": trajectory((1.0, 0.0)),  # type: ignore[arg-type]
+    "times": trajectory((1.0, 0.0, -1.0), (1.0, 0.1, -1.0)),
+    "not_finite": trajectory((1.0, math.nan, -1.0)),
+    "out_of_limits": trajectory((1.0, 0.0, 0.5)),
+    "joint_names": trajectory((1.0, 0.0, -1.0), names=[ARM[0], ARM[0]]),
+}
+
+
+@pytest.mark.parametrize("reason", BAD)
+def test_a_bad_trajectory_is_refused_whole_and_nothing_moves(
+    client: SimClient, reason: str
+) -> None:
+    before = client.position(ARM[0])
+    client.trajectory.publish(BAD[reason])
+    report = client.graph.wait_for(
+        lambda: next((r for r in client.reports if f"refused_{reason}" in r), None)
+    )
+    assert report["last"].startswith(f"refused, {reason}: ")
+    assert client.position(ARM[0]) == pytest.approx(before, abs=1e-3)
+
+
+def test_a_flood_of_messages_does_not_stop_the_physics(client: SimClient) -> None:
+    start = seconds(client.joints[-1].header.stamp)
+    for _ in range(500):
+        client.trajectory.publish(BAD["not_finite"])
+    client.graph.wait_for(lambda: seconds(client.joints[-1].header.stamp) > start + 2.0)
+    client.trajectory.publish(trajectory((0.5, 0.3, -1.0)))
+    client.wait_until_at(ARM[0], 0.3)
+
+
+def test_depth_image_and_cloud_show_the_true_door(client: SimClient) -> None:
+    for kind, name, kept in (
+        (Image, "depth/image", client.images),
+        (CameraInfo, "depth/camera_info", client.infos),
+        (PointCloud2, "points", client.clouds),
+    ):
+        client.create_subscription(kind, name, kept.append, 10)
+    client.graph.wait_for(lambda: len(client.images) > 2 and len(client.clouds) > 2)
+    stamps = {cloud.header.stamp.nanosec: cloud for cloud in client.clouds}
+    image = next(i for i in client.images if i.header.stamp.nanosec in stamps)
+    cloud = stamps[image.header.stamp.nanosec]
+    assert image.header.frame_id == cloud.header.frame_id == "camera_optical_frame"
+    assert image.encoding == "32FC1"
+    depth = depth_from_image(image, 100.0)
+    camera = camera_from_info(client.infos[-1])
+    points = points_from_cloud(cloud, 100.0)
+    np.testing.assert_allclose(points, depth_to_points(depth, camera), rtol=1e-6, equal_nan=True)
+    truth = client.truths[-1]
+    model = KinematicModel.load(truth.model)
+    door = render(model.unit_cubes(truth.theta, truth.gamma), model.camera)
+    seen = np.isfinite(door)
+    assert np.median(np.abs(depth - door)[seen]) < 1e-3
+
+
+def test_the_world_changes_by_parameters_while_a_trajectory_runs(client: SimClient) -> None:
+    client.trajectory.publish(trajectory((20.0, 0.0, -1.0)))
+    values = [0.1, 0.2, 0.3, 0.1, 0.0, 0.01, 0.02]
+    assert client.set(placement="given", values=values, direction="push").successful
+    client.truths.clear()
+    truth = client.graph.wait_for(lambda: client.truths)[-1]
+    assert [*truth.theta, *truth.gamma] == pytest.approx(values)
+    assert client.position(ARM[0]) == pytest.approx(1.0, abs=0.01)  # back where it starts
+    assert client.set(placement="random", direction="pull").successful
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"placement": "given", "values": [5.0] + [0.0] * 6}, "x = 5 is outside"),
+        ({"placement": "given", "values": [0.0]}, "has 7 parameters"),
+        ({"placement": "somewhere"}, "'placement' must be one of"),
+        ({"model": "elephant"}, "elephant"),
+        ({"noise": "loud"}, "'noise' must be one of"),
+        ({"camera": "nowhere"}, "nowhere"),
+        ({"camera_rate": 1000.0}, "camera_rate"),
+        ({"renderer": "software"}, "renderer"),
+    ],
+)
+def test_a_wrong_parameter_is_refused_with_the_reason(
+    client: SimClient, values: dict[str, Any], text: str
+) -> None:
+    result = client.set(**values)
+    assert not result.successful
+    assert text in result.reason
+
+
+def test_boxes_have_no_door_state(client: SimClient) -> None:
+    assert client.set(model="box_c", table=True).successful
+    client.truths.clear()
+    assert client.graph.wait_for(lambda: client.truths)[-1].model == "box_c"
+    time.sleep(0.2)
+    client.doors.clear()
+    time.sleep(0.5)
+    assert client.doors == []
+    assert client.set(model="door", table=False).successful
+
+
+def test_the_clock_is_that_of_the_stamps(client: SimClient) -> None:
+    client.graph.wait_for(lambda: client.clocks and client.joints)
+    clock, stamp = seconds(client.clocks[-1].clock), seconds(client.joints[-1].header.stamp)
+    assert clock == pytest.approx(stamp, abs=1.0)
+
+
+def test_the_real_time_factor_is_kept(client: SimClient) -> None:
+    assert client.set(real_time_factor=0.25).successful
+    time.sleep(2.5)
+    assert float(client.report()["real_time_factor"]) == pytest.approx(0.25, abs=0.05)
+    assert client.set(real_time_factor=0.0).successful

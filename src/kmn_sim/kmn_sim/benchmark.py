@@ -30,7 +30,7 @@ MODEL = "door"
 SIMULATED = 4.0  # seconds
 CAMERA_RATE = 10.0  # frames a second
 FRAMES = 20
-CONTACT = -2.45  # base x (m) at which the outstretched hand presses against the door
+CONTACT = -0.83, -0.3  # base x and y (m) where the outstretched hand touches the door
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
@@ -60,10 +60,10 @@ def touch(simulation: Simulation) -> None:
     position = simulation.robot.state().positions.copy()
     position[3:10] = 0.0, 0.4, 0.0, -0.8, 0.0, -0.4, 0.0
     arm = Waypoint(1.0, tuple(position))
-    position[:2] = CONTACT + 1.2, -0.3
-    there = Waypoint(3.0, tuple(position))
+    position[:2] = CONTACT
+    there = Waypoint(4.0, tuple(position))
     simulation.controller.accept(Command(names, [arm, there]), simulation.time)
-    simulation.run(3.0)
+    simulation.run(4.0)
     assert simulation.door is not None
     bodies = simulation.robot.body, simulation.door.body
     if not simulation.physics.getContactPoints(*bodies):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 INTERRUPTED = 130  # exit status of a program that Ctrl-C ended, by convention 128 + SIGINT
-SIMULATOR = ("pybullet", "pybullet_utils")
+SIMULATOR = "pybullet"
 HINT = "install it with: make setup-simulation"
 
 
@@ -16,7 +16,7 @@ def _executable(module: str) -> Callable[[], int | None]:
         try:
             status: int | None = import_module(f"kmn_sim.{module}").main()
         except ModuleNotFoundError as error:
-            if error.name not in SIMULATOR:
+            if error.name != SIMULATOR:
                 raise
             print(f"{error.name} is missing; {HINT}", file=sys.stderr)
             return 1

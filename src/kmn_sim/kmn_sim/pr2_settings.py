@@ -29,8 +29,8 @@ class PR2Settings:
         Movable joints by name, in the order of ``joint_states``: base x, y and yaw first.
     leader, followers, follower_effort
         The gripper's commanded joint and those that turn with it.
-    position_gain, velocity_gain
-        Parts of the errors that a motor takes away in one step.
+    position_gain
+        Part of the position error that a motor takes away in one step.
     friction, spinning_friction
         Contact of the fingers.
     """
@@ -41,7 +41,6 @@ class PR2Settings:
     followers: tuple[str, ...]
     follower_effort: float
     position_gain: float
-    velocity_gain: float
     friction: float
     spinning_friction: float
 
@@ -57,7 +56,7 @@ class PR2Settings:
         section.allow(("name", "source", "joints", "mimics", "control", "grip"))
         mimics, control, grip = (section.section(key) for key in ("mimics", "control", "grip"))
         mimics.allow(("leader", "followers", "effort"))
-        control.allow(("position_gain", "velocity_gain"))
+        control.allow(("position_gain",))
         grip.allow(("friction", "spinning_friction"))
         joints = section.section("joints")
         return cls(
@@ -67,7 +66,6 @@ class PR2Settings:
             followers=tuple(mimics.values["followers"]),
             follower_effort=mimics.number("effort", 0.0),
             position_gain=control.number("position_gain", 0.0, 1.0),
-            velocity_gain=control.number("velocity_gain", 0.0, 1.0),
             friction=grip.number("friction", 0.0),
             spinning_friction=grip.number("spinning_friction", 0.0),
         )

@@ -34,6 +34,7 @@ class Robot:
         settings: PR2Settings,
         base: Sequence[float],
         floor: float,
+        step_time: float,
     ) -> None:
         self._physics, self._settings = physics, settings
         self.body: int = physics.loadURDF(
@@ -50,7 +51,8 @@ class Robot:
         self._all = [joint[0] for joint in self._joints.values() if joint[3] >= 0]
         self.limits = {name: _limits(self._joints[name]) for name in settings.names}
         self._efforts = [motor.effort for motor in settings.joints.values()]
-        self._speeds = [motor.velocity for motor in settings.joints.values()]
+        self._speeds = np.array([motor.velocity for motor in settings.joints.values()])
+        self._gain = settings.position_gain / step_time
         self._place(base)
         self._set_contacts()
         self._couple_fingers()
@@ -70,28 +72,17 @@ class Robot:
         states = self._physics.getJointStates(self.body, self._moved)
         return np.array([state[3] for state in states])
 
-    def update(self, desired: State) -> None:
-        """Let the motors drive towards a desired state in the next step of the physics."""
-        settings = self._settings
-        for joint, effort, speed, position, velocity in zip(
+    def update(self, desired: State, measured: State) -> None:
+        """Let the motors drive from the measured to a desired state in the physics' next step."""
+        error = desired.positions - measured.positions
+        velocities = desired.velocities + self._gain * error
+        self._physics.setJointMotorControlArray(
+            self.body,
             self._moved,
-            self._efforts,
-            self._speeds,
-            desired.positions,
-            desired.velocities,
-            strict=True,
-        ):
-            self._physics.setJointMotorControl2(
-                self.body,
-                joint,
-                self._physics.POSITION_CONTROL,
-                targetPosition=position,
-                targetVelocity=velocity,
-                positionGain=settings.position_gain,
-                velocityGain=settings.velocity_gain,
-                force=effort,
-                maxVelocity=speed,
-            )
+            self._physics.VELOCITY_CONTROL,
+            targetVelocities=np.clip(velocities, -self._speeds, self._speeds).tolist(),
+            forces=self._efforts,
+        )
         self._compensate_gravity()
 
     def _info(self, joint: int) -> Any:

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
-from pybullet_utils.bullet_client import BulletClient
 
 from kmn_sim.carton import Carton
 from kmn_sim.cuboids import Cuboid, door_cuboids, floor_cuboid, table_cuboids
 from kmn_sim.door import Door
 from kmn_sim.interpolation import State
+from kmn_sim.physics import Physics
 from kmn_sim.pr2_model import pr2_urdf
 from kmn_sim.pr2_settings import PR2Settings
 from kmn_sim.renderer import Renderer
@@ -64,7 +63,7 @@ class Simulation:
         self._door_settings, self._box_settings = DoorSettings.load(), BoxSettings.load()
         self._pr2_settings, self._urdf = PR2Settings.load(), pr2_urdf()
         self._from_desired_state = from_desired_state
-        self.physics: Any = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
+        self.physics: Any = Physics(gui)
         # Before there are bodies: a renderer does not know of those that were there before it.
         self.renderer = Renderer(self.physics, renderer)
         self.step_time = 1.0 / self._settings.rate
@@ -98,7 +97,9 @@ class Simulation:
         if scenario.table:
             self._stand(table_cuboids(self._box_settings))
         self.floor = -self._box_settings.table_height if scenario.table else 0.0
-        self.robot = Robot(physics, self._urdf, self._pr2_settings, base, self.floor)
+        self.robot = Robot(
+            physics, self._urdf, self._pr2_settings, base, self.floor, self.step_time
+        )
         if scenario.floor:
             ground = self._stand([floor_cuboid(scenario, self._box_settings)])
             # The robot's base moves in a plane: its wheels do not touch the ground.
@@ -111,8 +112,9 @@ class Simulation:
 
     def step(self) -> None:
         """Advance the world by one step."""
-        self.desired = self.controller.sample(self.time, self.robot.state())
-        self.robot.update(self.desired)
+        measured = self.robot.state()
+        self.desired = self.controller.sample(self.time, measured)
+        self.robot.update(self.desired, measured)
         if self.door is not None:
             self.door.update()
         self.physics.stepSimulation()

@@ -31,7 +31,7 @@ demo: build  ## estimate boxes on real Kinect clouds, through a bag and the node
 	@./run kmn_perception demo_bag
 
 .PHONY: evaluate
-evaluate: build  ## regenerate docs/results, table and figures; an interrupted one goes on (1 hour)
+evaluate: build  ## regenerate docs/results, table and figures (half an hour; interrupted, it goes on)
 	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results
 
 .PHONY: test

@@ -5,6 +5,7 @@ from itertools import islice
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from kmn_perception.cascade import Cascade, CascadeSettings
 from kmn_perception.kinematic_model import KinematicModel
@@ -108,7 +109,9 @@ def test_a_cascade_starts_where_the_points_are(name: str) -> None:
     model = KinematicModel.load(name)
     network = Cascade(model, CascadeSettings.load(), stages=0)
     prototype = observe(model, np.zeros(len(model.parameters)))
-    moved = Observation(prototype.points + np.float32([0.2, -0.1, 0.0]), model.camera)
+    moved = Observation(
+        prototype.points + np.array([0.2, -0.1, 0.0], dtype=np.float32), model.camera
+    )
     expected = np.zeros((2, len(model.parameters)))
     expected[1, :2] = 0.2, -0.1
     np.testing.assert_allclose(network.start([prototype, moved]), expected, atol=1e-5)
@@ -146,7 +149,7 @@ def test_observations_are_predicted_together_as_alone() -> None:
 def test_a_cascade_that_diverges_still_has_bodies_with_a_size(name: str, factor: float) -> None:
     model = KinematicModel.load(name)
     network = Cascade(model, CascadeSettings.load(), stages=0)
-    values = np.zeros((1, len(model.parameters)))
+    values: NDArray[np.float64] = np.zeros((1, len(model.parameters)))
     for _ in range(3):
         values = network.concatenate(values, factor * np.abs(model.limits[None, :, 1]))
     cubes = model.unit_cubes(*model.split(values[0]))

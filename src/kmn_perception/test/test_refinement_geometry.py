@@ -12,13 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.refinement.geometry import (
-    meet_any,
-    projection,
-    shape_of,
-    unit_cubes_jacobian,
-    view_of,
-)
+from kmn_perception.refinement.geometry import shape_of, unit_cubes_jacobian
+from kmn_perception.refinement.view import meet_any, projection, view_of
 from kmn_perception.rendering import render
 
 Vector = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.evaluation.comparison import Request
-from kmn_perception.evaluation.figures.training import _smooth
+from kmn_perception.evaluation.figures.training import smooth
 from kmn_perception.evaluation.page import markdown
 from kmn_perception.evaluation.results import main, result_of
 from kmn_perception.evaluation.settings import EvaluationSettings
@@ -61,14 +61,14 @@ def test_what_was_evaluated_is_taken_over_unless_something_has_changed(
         assert evaluated(Request("box_a", 1, "mm", methods=few), samples=3)
 
 
-def test_a_smoothed_power_law_is_the_same_and_a_peak_is_spread() -> None:
+def test_asmoothed_power_law_is_the_same_and_a_peak_is_spread() -> None:
     """Means are of logarithms, of which an exponential has a straight line."""
     falling = np.exp(-np.linspace(0.0, 3.0, 60))
-    np.testing.assert_allclose(_smooth(falling)[4:-4], falling[4:-4])
+    np.testing.assert_allclose(smooth(falling)[4:-4], falling[4:-4])
     peak = np.ones(60)
     peak[30] = np.e**9
-    np.testing.assert_allclose(_smooth(peak)[26:35], np.e)  # 4 neighbours to either side
-    np.testing.assert_allclose(_smooth(peak)[:26], 1.0)
+    np.testing.assert_allclose(smooth(peak)[26:35], np.e)  # 4 neighbours to either side
+    np.testing.assert_allclose(smooth(peak)[:26], 1.0)
 
 
 def test_a_table_has_a_head_and_a_line_for_each_row() -> None:
@@ -78,7 +78,7 @@ def test_a_table_has_a_head_and_a_line_for_each_row() -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["--models", "boat"], "results: 'boat' is neither a file nor one of the shipped"),
+        (["--models", "boat"], "invalid choice: 'boat'"),
         (["--samples", "0"], "0 is not a whole number from 1"),
     ],
 )

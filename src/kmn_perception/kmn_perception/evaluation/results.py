@@ -49,7 +49,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=Path, default=Path("docs/results"), help="default docs/results"
     )
-    parser.add_argument("--models", nargs="+", default=MODELS, help="default: all shipped ones")
+    parser.add_argument("--models", nargs="+", default=MODELS, choices=MODELS, help="default: all")
     parser.add_argument("--anew", action="store_true", help="do not take over earlier results")
     parser.add_argument(
         "--jobs", type=whole_number(1), default=os.cpu_count() or 1, help="processes (default: all)"

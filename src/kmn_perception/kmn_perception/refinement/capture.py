@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import Shape, View, cuboids, meet, meet_any, view_of
+from kmn_perception.refinement.geometry import Shape, cuboids
 from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.view import View, meet, meet_any, view_of
 
 
 def capture(

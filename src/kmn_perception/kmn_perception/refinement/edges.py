@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import View, add_normal_equations
 from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.silhouette import EdgeSettings, half_chord, scan, split
+from kmn_perception.refinement.view import PLANES, View, add_normal_equations
 
 LARGEST_WINDOW = 64  # pixels to either side of an edge
 ROOT_HALF = math.sqrt(0.5)
@@ -117,7 +117,7 @@ def _add_edge(
     lowest = image.floor + settings.floor_margin
     evidence = np.empty(4 * LARGEST_WINDOW)
     line, ends = lines[edge], all_ends[edge]
-    plane = solids[b, 4 + 3 * faces[edge] : 7 + 3 * faces[edge]]
+    plane = solids[b, PLANES + 3 * faces[edge] : PLANES + 3 * faces[edge] + 3]
     rows = abs(line[0]) >= abs(line[1])
     along = 1 if rows else 0
     extent, width = inverse_depth.shape[1 - along], inverse_depth.shape[along]
@@ -144,7 +144,7 @@ def _add_edge(
         seen += 1
         if noise > 0.0:
             _add_probit(
-                line, start, step, a, rows, evidence[:count], sharpness,
+                lines, faces, edge, start, step, a, rows, evidence[:count], sharpness,
                 _taper(a, low + border, high - border, border), moment, force, sums,
             )  # fmt: skip
         behind = split(evidence[:count])
@@ -158,7 +158,7 @@ def _add_edge(
         u, v = (at, float(a)) if rows else (float(a), at)
         distance = line[0] * u + line[1] * v + line[2]
         if noise > 0.0:
-            weight = 12.0 / samples  # rows that are all cut alike fix an edge to a pixel, together
+            weight = 1.0 / (1.0 / 12.0 + noise**2) / samples  # all together, like a single row
         else:
             weight = 9.0 / window**2 / (1.0 + (2.0 * distance / window) ** 2)
             weight *= 1.0 if has_step else LOST
@@ -180,7 +180,9 @@ def _taper(a: int, low: float, high: float, border: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _add_probit(
-    line: NDArray[np.float64],
+    lines: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edge: int,
     start: int,
     step: int,
     a: int,
@@ -199,8 +201,8 @@ def _add_probit(
         p = float(start + step * k)
         u, v = (p, float(a)) if rows else (float(a), p)
         sign, sure = np.sign(evidence[k]), abs(evidence[k])
-        t = sign * (line[0] * u + line[1] * v + line[2]) / noise
-        if t > FAR:
+        t = sign * (lines[edge, 0] * u + lines[edge, 1] * v + lines[edge, 2]) / noise
+        if t > FAR or _nearer_to_another(lines, faces, edge, u, v):
             continue
         likely = 1.0 - sure + (2.0 * sure - 1.0) * 0.5 * math.erfc(-t * ROOT_HALF)
         density = (2.0 * sure - 1.0) * math.exp(-0.5 * t * t) / ROOT_TWO_PI
@@ -211,6 +213,20 @@ def _add_probit(
         sums[1] += weight * t * push
         sums[2] += weight * t * t * information
         _add(moment, force, weight * information / noise**2, -weight * sign * push / noise, u, v)
+
+
+@njit(cache=True, error_model="numpy")
+def _nearer_to_another(
+    lines: NDArray[np.float64], faces: NDArray[np.int64], edge: int, u: float, v: float
+) -> bool:
+    """Tell whether a pixel lies farther outside of (or less inside) another edge of the body."""
+    distance = lines[edge, 0] * u + lines[edge, 1] * v + lines[edge, 2]
+    for other in range(12):
+        if other == edge or faces[other] < 0:
+            continue
+        if lines[other, 0] * u + lines[other, 1] * v + lines[other, 2] < distance:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from kmn_perception.refinement.capture import capture
 from kmn_perception.refinement.edges import EdgeTerms, edge_terms
-from kmn_perception.refinement.geometry import View
 from kmn_perception.refinement.planes import PlaneTerms, plane_terms
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.settings import SearchSettings
+from kmn_perception.refinement.view import View
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.observation import Observation
-from kmn_perception.refinement.geometry import projection
+from kmn_perception.refinement.view import projection
 
 HALF = 0.5
 LEAST_RANGE = 1e-6  # metres

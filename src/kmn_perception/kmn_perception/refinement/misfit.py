@@ -6,9 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import View, meet_any
 from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.view import View, meet_any
 
+MOST = 15  # times as many pixels as asked for are looked at in all
 DIGITS = 6  # of the share; less is the rounding of the points
 
 
@@ -52,10 +53,11 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
     top, bottom = max(solids[:, 2].min(), 0.0), min(solids[:, 3].max(), height - 1.0)
     if left > right or top > bottom:
         return 0.0
-    step = max(1, int(np.sqrt((right - left + 1.0) * (bottom - top + 1.0) / count)))
+    area = max(image.pixels.shape[0], height * width // MOST)
+    step = max(1, int(np.sqrt(area / count)))  # the same for all views, so that none is favoured
     unseen = 0
-    for row in range(int(np.ceil(top)), int(bottom) + 1, step):
-        for column in range(int(np.ceil(left)), int(right) + 1, step):
+    for row in range(int(np.ceil(top / step)) * step, int(bottom) + 1, step):
+        for column in range(int(np.ceil(left / step)) * step, int(right) + 1, step):
             if inverse_depth[row, column] == 0.0:
                 unseen += _predicted(solids, image, float(column), float(row)) > 0.0
     return float(unseen * step**2)

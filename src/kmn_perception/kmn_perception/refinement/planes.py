@@ -9,8 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import View, add_normal_equations, meet_any
 from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.view import PLANES, View, add_normal_equations, meet_any
+
+LAGS = 8  # rows that may be shifted alike
 
 
 class PlaneTerms(NamedTuple):
@@ -65,7 +67,7 @@ def plane_terms(
     deviations = np.empty((bodies, 6))
     for body in range(bodies):
         for face in range(6):
-            k = 4 + 3 * face
+            k = PLANES + 3 * face
             steepness = solids[body, k] ** 2 + solids[body, k + 1] ** 2
             deviations[body, face] = math.sqrt(noise**2 + lateral**2 * steepness)
     residuals = np.empty(pixels.shape[0] // stride + 1)
@@ -105,12 +107,23 @@ def plane_terms(
                 continue
             moment, force = moments[body, face], forces[body, face]
             moment[1, 0], moment[2, 0], moment[2, 1] = moment[0, 1], moment[0, 2], moment[1, 2]
-            in_rows = (row_sums[body, face] ** 2).sum() / counts[body, face]
-            in_columns = (column_sums[body, face] ** 2).sum() / counts[body, face]
-            alike = max(1.0, in_rows, in_columns)
+            in_rows, in_columns = _alike(row_sums[body, face]), _alike(column_sums[body, face])
+            alike = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
             slopes = view.plane_slopes[body, face]
             add_normal_equations(hessian, gradient, slopes, moment / alike, force / alike)
     return PlaneTerms(hessian, gradient, residuals[:count])
+
+
+@njit(cache=True, error_model="numpy")
+def _alike(sums: NDArray[np.float64]) -> float:
+    """Return the variance of the sum of the residuals of all rows, as those of each row show it.
+
+    Neighbouring rows may be shifted alike, too (Newey and West).
+    """
+    variance = alone = (sums**2).sum()
+    for lag in range(1, LAGS):
+        variance += 2.0 * (1.0 - lag / LAGS) * (sums[lag:] * sums[:-lag]).sum()
+    return max(alone, variance)
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,8 +133,8 @@ def _rims(solids: NDArray[np.float64], border: float) -> NDArray[np.float64]:
     for body in range(solids.shape[0]):
         for face in range(6):
             for other in range(6):
-                across = solids[body, 4 + 3 * face : 6 + 3 * face]
-                across = across - solids[body, 4 + 3 * other : 6 + 3 * other]
+                across = solids[body, PLANES + 3 * face : PLANES + 3 * face + 2]
+                across = across - solids[body, PLANES + 3 * other : PLANES + 3 * other + 2]
                 rims[body, face, other] = border * math.hypot(across[0], across[1])
     return rims
 
@@ -139,7 +152,7 @@ def _at_rim(
     """Tell whether a pixel lies near the rim of the face that it shows."""
     for other in range(6):
         if other != face:
-            k = 4 + 3 * other
+            k = PLANES + 3 * other
             beyond = solids[body, k] * u + solids[body, k + 1] * v + solids[body, k + 2]
             if abs(inverse_depth - beyond) < rims[body, face, other]:
                 return True

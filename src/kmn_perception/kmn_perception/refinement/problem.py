@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation
-from kmn_perception.refinement.geometry import Shape, View, cuboids, shape_of, view_of
+from kmn_perception.refinement.geometry import Shape, cuboids, shape_of
 from kmn_perception.refinement.image import Image, image_of
 from kmn_perception.refinement.misfit import misfit
 from kmn_perception.refinement.settings import RefinementSettings
+from kmn_perception.refinement.view import View, view_of
 
 SOME = 1000  # pixels that tell the object's distance
 LEAST_MOVEMENT = 1e-12  # pixels per unit

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.geometry import meet
+from kmn_perception.refinement.view import meet
 
 CERTAIN = 5.0  # standard deviations that tell two depths apart
 MOST = 100.0  # of a log-likelihood ratio

@@ -54,7 +54,7 @@ def _draw(axes: Axes, metadata: Mapping[str, Any], role: str) -> None:
         few = np.unique(np.linspace(0, len(mine) - 1, DRAWN).astype(int))
         axes.plot(at[few], mine[few], color=colour, alpha=0.25, linewidth=0.6)
         label = f"{_name(role, number)}: error {by_step[-1]:.5f}"
-        axes.plot(at, _smooth(mine), color=colour, linewidth=1.5, label=label)
+        axes.plot(at, smooth(mine), color=colour, linewidth=1.5, label=label)
     axes.set(yscale="log")
     axes.legend(loc="best")
 
@@ -65,7 +65,7 @@ def _name(role: str, number: int) -> str:
     return f"retraining {number}" if number else "first training"
 
 
-def _smooth(losses: NDArray[np.float64]) -> NDArray[np.float64]:
+def smooth(losses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return geometric means over neighbours; at the ends over fewer."""
     reach = len(losses) // SMOOTHED
     sums = np.concatenate(([0.0], np.cumsum(np.log(losses))))

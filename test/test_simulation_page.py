@@ -1,0 +1,29 @@
+"""The page about the simulator names its parameters with their defaults, and its executables."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import yaml
+
+from kmn_perception import resources
+from kmn_sim import executables
+from kmn_sim.node_parameters import DESCRIPTORS
+
+PAGE = (Path(__file__).parents[1] / "docs/simulation.md").read_text(encoding="utf-8")
+
+
+def test_every_parameter_stands_there_with_its_default() -> None:
+    file = yaml.safe_load(resources.find("config/nodes", "sim_node").read_text())
+    rows = dict(re.findall(r"^\| `(\w+)` \| [\w ]+ \| (.*?) \|", PAGE, flags=re.MULTILINE))
+    for name, default in file["/**"]["ros__parameters"].items():
+        text = rows[name].strip("`")
+        assert (yaml.safe_load(text) if text != '""' else "") == default, name
+    assert file["/**"]["ros__parameters"].keys() == DESCRIPTORS.keys()
+
+
+def test_every_executable_stands_there() -> None:
+    rows = set(re.findall(r"^\| `(\w+)", PAGE, flags=re.MULTILINE))
+    assert {"sim_node", "snapshot", "check_perception", "benchmark"} <= rows
+    assert callable(executables.sim_node)

@@ -24,7 +24,8 @@ def simulate() -> Iterator[MakeSimulation]:
         def make(model: str = "door", values: Any = None, **options: Any) -> Simulation:
             kinematic = KinematicModel.load(model)
             values = np.zeros(len(kinematic.parameters)) if values is None else np.array(values)
-            simulation = Simulation(Scenario(kinematic, values, **options))
+            renderer = options.pop("renderer", "egl")
+            simulation = Simulation(Scenario(kinematic, values, **options), renderer=renderer)
             return stack.enter_context(closing(simulation))
 
         yield make

@@ -1,0 +1,78 @@
+"""sim_node as a program: how it starts, what it says when it cannot, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+
+def start(domain: int, *parameters: str, **environment: str) -> subprocess.Popen[str]:
+    arguments = [text for parameter in parameters for text in ("-p", parameter)]
+    return subprocess.Popen(
+        [sys.executable, "-m", "kmn_sim.start_sim_node", "--ros-args", *arguments],
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain), **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> None:
+    process = start(domain)
+    assert process.stdout is not None
+    while "simulating model" not in (line := process.stdout.readline()):
+        assert line, "sim_node ended"
+    time.sleep(0.5)  # the handlers are set up right after that line
+    process.send_signal(interrupt)
+    rest, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Traceback" not in rest
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("model:=elephant", "'elephant' is neither a file nor"),
+        ("placement:=somewhere", "'placement' must be one of"),
+        ("values:=[1.0]", "has 7 parameters"),
+        ("camera_rate:=0.0", "camera_rate"),
+        ("record:=/nowhere/film.gif", "'record' must be a file"),
+    ],
+)
+def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:
+    process = start(domain, parameter, "placement:=given" if "values" in parameter else "seed:=1")
+    printed, _ = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert "Traceback" not in printed
+    assert text in printed
+
+
+def test_without_the_robots_package_it_says_what_to_install(domain: int, tmp_path: Path) -> None:
+    (tmp_path / "robotic.py").write_text("raise ImportError('liblapack.so.3 is missing')")
+    path = f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"
+    process = start(domain, XDG_CACHE_HOME=str(tmp_path), PYTHONPATH=path)
+    printed, _ = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert "make setup-simulation" in printed
+    assert "Traceback" not in printed
+
+
+@pytest.mark.parametrize("ending", ["gif", "mp4"])
+def test_a_run_is_recorded(domain: int, tmp_path: Path, ending: str) -> None:
+    film = tmp_path / f"film.{ending}"
+    process = start(domain, f"record:={film}", "real_time_factor:=0.0", "record_rate:=5.0")
+    assert process.stdout is not None
+    while "simulating model" not in (line := process.stdout.readline()):
+        assert line, "sim_node ended"
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(5.0)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert film.stat().st_size > 5000

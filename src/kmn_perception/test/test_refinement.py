@@ -110,7 +110,7 @@ def test_no_start_is_needed(name: str) -> None:
 
 def misfit_of(model: KinematicModel, observation: Observation, values: Vector) -> float:
     """Return the common misfit of values that are not refined."""
-    return Problem.of(model, observation, SETTINGS).misfit(values)
+    return Problem.of(model, observation, SETTINGS).final_misfit(values)
 
 
 def nonsense(case: str) -> tuple[KinematicModel, Observation, Vector]:

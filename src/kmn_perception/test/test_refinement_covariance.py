@@ -114,3 +114,17 @@ def test_more_noise_is_more_uncertainty() -> None:
         covariance = refine(box, observation, truth, SETTINGS).covariance
         spreads.append(np.sqrt(np.trace(covariance)))
     assert spreads[0] < spreads[1] < spreads[2] < 0.002
+
+
+def test_a_start_that_is_kept_has_a_covariance_that_holds_the_truth() -> None:
+    """Noise may make a start explain a little more than the fit; it is then returned."""
+    box = KinematicModel.load("box_a")
+    observation, truth = sample(box, 33, 686, None, "kinect", EVALUATION)
+    start = truth + [0.0, 4e-4]
+    result = refine(box, observation, start, SETTINGS)
+    assert not result.improved
+    assert result.reason == ""
+    np.testing.assert_array_equal(result.values, start)
+    error = start - truth
+    assert error @ np.linalg.solve(result.covariance, error) < 9.0
+    assert np.sqrt(np.trace(result.covariance)) < 0.001

@@ -55,9 +55,14 @@ class Problem:
         return view_of(self.shape, values, self.image.projection)
 
     def misfit(self, values: NDArray[np.float64]) -> float:
-        """Return the share of pixels that the model at ``values`` explains wrongly."""
+        """Return the share of pixels that the model explains wrongly, from some of them."""
         settings = self.settings.misfit
         return misfit(self.view(values), self.image, settings.pixels, settings.depth)
+
+    def final_misfit(self, values: NDArray[np.float64]) -> float:
+        """Return the share of pixels that the model explains wrongly, from many of them."""
+        settings = self.settings.misfit
+        return misfit(self.view(values), self.image, settings.final_pixels, settings.depth)
 
     def kept(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values kept within the limits, and a margin beside them."""

@@ -84,8 +84,8 @@ class MisfitSettings:
 
     Attributes
     ----------
-    pixels
-        About this many of the observed pixels are looked at.
+    pixels, final_pixels
+        About this many of the observed pixels are looked at, during the search and in the end.
     depth
         A difference in depth (metres) that counts as much as a pixel on the wrong side.
     bad, wrong
@@ -93,6 +93,7 @@ class MisfitSettings:
     """
 
     pixels: int
+    final_pixels: int
     depth: float
     bad: float
     wrong: float
@@ -216,9 +217,10 @@ def _edges(section: Section) -> EdgeSettings:
 
 
 def _misfit(section: Section) -> MisfitSettings:
-    section.allow(("pixels", "depth", "bad", "wrong"))
+    section.allow(("pixels", "final_pixels", "depth", "bad", "wrong"))
     return MisfitSettings(
         section.whole_number("pixels", 100, 10**8),
+        section.whole_number("final_pixels", 100, 10**8),
         section.number("depth", 1e-6, 10.0),
         section.number("bad", 0.0, 10.0),
         section.number("wrong", 0.0, 10.0),

@@ -16,7 +16,7 @@ from kmn_perception.refinement.settings import RefinementSettings
 
 SCAN = 9  # values of each parameter that are tried, within its limits
 YAWS = 9
-AT_THE_FIT = 10.0  # squared distance for each parameter, at which a start is as good as the fit
+AT_THE_FIT = 3.0  # pixels or standard deviations within which a start is as good as the fit
 
 
 class Refinement(NamedTuple):
@@ -31,8 +31,9 @@ class Refinement(NamedTuple):
     iterations
         Steps that were taken.
     improved
-        The misfit is not larger than that of the start. Else the start is returned, with the fit's
-        covariance where the start agrees with the fit, and with that of the limits where not.
+        The misfit is not larger than that of the start. Else the start is returned; its covariance
+        is that of the fit and their difference where the two agree, and that of the limits where
+        they do not.
     reason
         Why the result is not to be trusted; empty when it is fine.
     """
@@ -102,14 +103,15 @@ def _refined(
         values, covariance = best.values, _within_limits(model)
     else:
         values, covariance = with_covariance(problem, best)
-    misfit, before = problem.misfit(values), problem.misfit(start)
+    misfit, before = problem.final_misfit(values), problem.final_misfit(start)
     improved = misfit <= before
     if not improved:
         error = start - values
-        if error @ np.linalg.pinv(covariance, hermitian=True) @ error > AT_THE_FIT * len(error):
+        spread = covariance + np.diag(problem.pixels_per_unit(values) ** -2.0)
+        if error @ np.linalg.solve(spread, error) > AT_THE_FIT**2 * len(error):
             reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
             return _unrefined(model, start, before, iterations, reason)
-        values, misfit = start, before
+        values, covariance, misfit = start, covariance + np.outer(error, error), before
     reason = ""
     if misfit > settings.wrong:
         reason = f"the model explains {misfit:.0%} of the observation wrongly"

@@ -64,6 +64,21 @@ def test_without_the_robots_package_it_says_what_to_install(domain: int, tmp_pat
     assert "Traceback" not in printed
 
 
+def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
+    process = start(domain, __EGL_VENDOR_LIBRARY_DIRS="/nowhere")
+    assert process.stdout is not None
+    lines = []
+    while "simulating model" not in (line := process.stdout.readline()):
+        assert line, "sim_node ended"
+        lines.append(line)
+    assert "renderer 'egl' does not start; rendering by 'software'" in "".join(lines)
+    assert "depth by 'software'" in line
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
 def test_a_run_is_recorded(domain: int, tmp_path: Path, ending: str) -> None:
     film = tmp_path / f"film.{ending}"

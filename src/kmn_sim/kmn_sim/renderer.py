@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
+import sys
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +18,16 @@ from kmn_sim.clipping import nearest_depth
 
 RENDERERS = ("egl", "software")
 LIGHT = (-3.0, -2.0, 4.0)  # direction towards the light, for pictures
+EGL_PLUGIN = "_eglRendererPlugin"
+EGL_READY, EGL_TIMEOUT = b"EGL is ready", 60.0  # seconds
+EGL_TRIAL = """
+import pybullet, sys
+client = pybullet.connect(pybullet.DIRECT)
+plugin = pybullet.loadPlugin(*sys.argv[1:])
+pybullet.getCameraImage(8, 8, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
+if plugin >= 0:
+    print("EGL is ready")
+"""
 NEAR_MARGIN = 0.95  # of the nearest thing's depth, where the clipping plane is put
 FAR_MARGIN = 0.999  # of the farthest depth; what is beyond is the renderers' background
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # optical frame (z forward, y down) to OpenGL's
@@ -97,10 +110,21 @@ class Renderer:
 def _load_egl(physics: Any) -> int:
     """Load the plugin of the EGL renderer; return a negative number where it does not start."""
     found = importlib.util.find_spec("eglRenderer")
-    if found is None or found.origin is None:
+    if found is None or found.origin is None or not _egl_starts(found.origin):
         return -1
-    plugin: int = physics.loadPlugin(found.origin, "_eglRendererPlugin")
+    plugin: int = physics.loadPlugin(found.origin, EGL_PLUGIN)
     return plugin
+
+
+@cache
+def _egl_starts(plugin: str) -> bool:
+    """Try the plugin in another process: where EGL fails, it ends the whole process."""
+    command = [sys.executable, "-c", EGL_TRIAL, plugin, EGL_PLUGIN]
+    try:
+        trial = subprocess.run(command, capture_output=True, timeout=EGL_TIMEOUT, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return EGL_READY in trial.stdout
 
 
 def _projection(camera: Camera) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -155,18 +156,41 @@ class MorphEstimator:
 
     def estimate(self, observation: Observation) -> Estimate:
         """Estimate the morphing parameters of an object, of which alone the points are."""
-        model, settings, points = self.model, self.settings, observation.points
-        if len(points) == 0:
-            return Estimate.none(model, 0, Status.NO_OBJECT, "no points of an object")
-        if len(points) < settings.min_points:
-            reason = f"{len(points)} points, at least {settings.min_points} are needed"
-            return Estimate.none(model, len(points), Status.TOO_FEW_POINTS, reason)
+        return self.estimate_all([observation])[0]
+
+    def estimate_all(self, observations: Sequence[Observation]) -> list[Estimate]:
+        """Estimate the morphing parameters of several objects, predicted together."""
+        enough = [o for o in observations if len(o.points) >= max(self.settings.min_points, 1)]
+        if not enough:
+            return [self._too_few(observation) for observation in observations]
         prediction, iterations = predict(
-            self.network, [observation], settings.iterations, settings.tolerance
+            self.network, enough, self.settings.iterations, self.settings.tolerance
         )
-        values, change = prediction.values[0], float(prediction.change[0])
+        estimates = (
+            self._finish(observation, values, float(change), iterations)
+            for observation, values, change in zip(
+                enough, prediction.values, prediction.change, strict=True
+            )
+        )
+        return [
+            next(estimates) if observation in enough else self._too_few(observation)
+            for observation in observations
+        ]
+
+    def _too_few(self, observation: Observation) -> Estimate:
+        count = len(observation.points)
+        if count == 0:
+            return Estimate.none(self.model, 0, Status.NO_OBJECT, "no points of an object")
+        reason = f"{count} points, at least {self.settings.min_points} are needed"
+        return Estimate.none(self.model, count, Status.TOO_FEW_POINTS, reason)
+
+    def _finish(
+        self, observation: Observation, values: NDArray[np.float64], change: float, iterations: int
+    ) -> Estimate:
+        """Refine what was predicted, and judge it."""
+        model, points = self.model, observation.points
         covariance: NDArray[np.float64] = np.full((len(values),) * 2, np.nan)
-        if settings.refine:
+        if self.settings.refine:
             fit = refine(model, observation, values, self.refinement)
             values, covariance, doubt = fit.values, fit.covariance, fit.reason
         else:

@@ -182,6 +182,9 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "cluster": _any("Keep only the nearest large cluster."),
     "cluster_step": _real("Larger steps between neighbours part clusters [m].", 0.001, 1.0),
     "cluster_min_points": _whole("Smaller clusters are not objects.", 1, 1_000_000),
+    "cluster_crease": _real(
+        "Sharper concave creases of a surface part clusters; 0: none do [rad].", 0.0, 3.0
+    ),
     "iterations": _whole("Largest number N of predictions (Algorithm 1).", 1, 100),
     "tolerance": _real(
         "Without refinement: converged when the last step changed theta by less [m, rad, 1].",

@@ -24,14 +24,19 @@ class Observation:
         (N, 3) world frame, metres, finite.
     camera
         The sensor: its intrinsics, the size of its image and its pose in the world. What lies
-        outside its image was not seen, what lies inside without a point was seen to be empty.
+        outside its image was not seen.
     floor
         Height (metres, world z) up to which points were lost with the support plane.
+    free_depth
+        (height, width) depth in metres up to which a pixel that shows no point of the object was
+        seen to be empty: infinite for all of its line of sight, 0 where nothing is known. Beyond
+        it the object may be hidden. ``None``: infinite for all pixels.
     """
 
     points: NDArray[np.float32]
     camera: Camera
     floor: float = -np.inf
+    free_depth: NDArray[np.float32] | None = None
 
 
 def point_cloud_to_depth(

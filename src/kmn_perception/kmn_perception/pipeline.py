@@ -1,20 +1,24 @@
-"""From what a camera measured to the morphing parameters of the object that it sees."""
+"""From what a camera measured to the morphing parameters of the objects that it sees."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.free_depth import free_depth, touches_unseen
 from kmn_perception.intrinsics import camera_as_dense, camera_of_points
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.segmentation import SegmentationSettings, remove_background
+from kmn_perception.segmentation import SegmentationSettings, segment
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
+
+UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
 
 
 class CameraPose(str, Enum):
@@ -47,6 +51,37 @@ class PipelineSettings:
     background: SegmentationSettings
 
 
+class NoCameraPoseError(Exception):
+    """The camera's pose cannot be found; the text says why."""
+
+
+class ObjectView(NamedTuple):
+    """What is seen of an object.
+
+    Attributes
+    ----------
+    observation
+        Its points, and what is known around them.
+    mask
+        (height, width), or (N,) for unorganised points: which ones they are.
+    cut
+        The object goes on where nothing is seen: beyond the image's border.
+    """
+
+    observation: Observation
+    mask: NDArray[np.bool_]
+    cut: bool
+
+
+class ObjectEstimate(NamedTuple):
+    """An estimate with what it rests on, see `ObjectView`."""
+
+    estimate: Estimate
+    observation: Observation
+    mask: NDArray[np.bool_]
+    cut: bool
+
+
 class MorphPipeline:
     """Camera pose, background removal and estimation, one after the other.
 
@@ -66,11 +101,13 @@ class MorphPipeline:
         points = depth_to_points(render(prototype, model.camera), model.camera)
         find_support_plane(points, self.settings.plane)
         for cloud in (points, points.reshape(-1, 3)):
-            remove_background(cloud, model.camera.pose, np.zeros(3), self.settings.background)
+            segment(cloud, model.camera.pose, np.zeros(3), self.settings.background)
+        free = free_depth(points, np.eye(4), model.camera.pose, 0.0)
+        touches_unseen(np.isfinite(points[..., 2]), free)
         self.estimator.warm_up()
 
     def estimate(self, points: NDArray[np.float32], in_world: bool = False) -> Estimate:
-        """Estimate the morphing parameters of the object among the points.
+        """Estimate the morphing parameters of the nearest object among the points.
 
         Parameters
         ----------
@@ -80,50 +117,109 @@ class MorphPipeline:
         in_world
             The points are in the world frame already.
         """
-        observation = self.observe(points, in_world)
-        if observation is None:
-            plane = self.settings.plane
-            reason = (
-                f"no support plane: no plane within {np.degrees(plane.max_tilt):.0f} deg of level "
-                f"holds {100 * plane.min_fraction:.0f} % of the points"
-            )
-            return Estimate.none(self.estimator.model, 0, Status.NO_OBJECT, reason)
-        return self.estimator.estimate(observation)
+        return self._estimate(points, in_world, 1)[0].estimate
 
-    def observe(self, points: NDArray[np.float32], in_world: bool = False) -> Observation | None:
-        """Return what is seen of the object; None if the camera's pose cannot be found."""
-        pose = self._find_camera_pose(points, in_world)
-        if pose is None:
-            return None
+    def estimate_all(
+        self, points: NDArray[np.float32], in_world: bool = False
+    ) -> list[ObjectEstimate]:
+        """Estimate the morphing parameters of all objects among the points, the nearest first.
+
+        The parameters are those of `estimate`.
+
+        Returns
+        -------
+        objects
+            One or more: where there is no object, a single one says why.
+        """
+        return self._estimate(points, in_world, None)
+
+    def observe(
+        self, points: NDArray[np.float32], in_world: bool = False, most: int | None = None
+    ) -> list[ObjectView]:
+        """Return what is seen of the objects, ``most`` or all of them, the nearest first.
+
+        Raises
+        ------
+        NoCameraPoseError
+            If the camera's pose cannot be found.
+        """
+        pose = self.camera_pose(points, in_world)
         background = self.settings.background
         to_world = np.eye(4) if in_world else pose
-        seen = remove_background(points, to_world, pose[:3, 3], background)
+        segments = segment(points, to_world, pose[:3, 3], background)
         floor = background.plane_margin if background.remove_plane else -np.inf
-        camera = self._find_camera(points, seen, to_world, pose)
-        return Observation(seen, camera, floor)
+        camera, free = self._find_camera(points, to_world, pose), None
+        if camera is not None:
+            free = free_depth(points, camera.world_to_camera @ to_world, to_world, floor)
+        views = []
+        for label in range(segments.count)[:most]:
+            seen = segments.of_object(label)
+            mask = (segments.labels == label).reshape(points.shape[:-1])
+            sensor = camera or self._canonical_view(seen, pose)
+            cut = free is not None and touches_unseen(mask, free)
+            views.append(ObjectView(Observation(seen, sensor, floor, free), mask, cut))
+        return views
 
-    def _find_camera(
-        self,
-        points: NDArray[np.float32],
-        seen: NDArray[np.float32],
-        to_world: NDArray[np.float64],
-        pose: NDArray[np.float64],
-    ) -> Camera:
-        """Return the camera that an organised cloud shows, else one with the canonical view."""
-        if points.ndim == 3:
-            to_camera = np.linalg.inv(pose) @ to_world
-            camera = camera_of_points(points, to_camera, pose)
-            if camera is not None:
-                return camera
-        return camera_as_dense(seen, replace(self.estimator.model.camera, pose=pose))
+    def camera_pose(
+        self, points: NDArray[np.float32], in_world: bool = False
+    ) -> NDArray[np.float64]:
+        """Return the pose (4, 4) of the optical frame in the world frame.
 
-    def _find_camera_pose(
-        self, points: NDArray[np.float32], in_world: bool
-    ) -> NDArray[np.float64] | None:
+        Raises
+        ------
+        NoCameraPoseError
+            If it is to be found from the support plane, and there is none.
+        """
         canonical = self.estimator.model.camera.pose
         if in_world or self.settings.camera_pose is CameraPose.CANONICAL:
             return canonical
         if self.settings.camera_pose is CameraPose.GIVEN:
             return self.settings.given_pose
         plane = find_support_plane(points, self.settings.plane)
-        return None if plane is None else pose_above(plane, canonical)
+        if plane is None:
+            raise NoCameraPoseError(self._why_no_plane(points))
+        return pose_above(plane, canonical)
+
+    def _why_no_plane(self, points: NDArray[np.float32]) -> str:
+        settings = self.settings.plane
+        reason = (
+            f"no support plane: no plane within {np.degrees(settings.max_tilt):.0f} deg of level "
+            f"holds {100 * settings.min_fraction:.0f} % of the points"
+        )
+        if find_support_plane(points * UPSIDE_DOWN, settings) is not None:
+            reason += ", but one does in the image turned by 180 deg: the camera is upside down"
+        return reason
+
+    def _estimate(
+        self, points: NDArray[np.float32], in_world: bool, most: int | None
+    ) -> list[ObjectEstimate]:
+        model, reason = self.estimator.model, "no points of an object"
+        try:
+            views = self.observe(points, in_world, most)
+        except NoCameraPoseError as error:
+            views, reason = [], str(error)
+        if not views:
+            nothing = np.zeros(points.shape[:-1], dtype=np.bool_)
+            none = Estimate.none(model, 0, Status.NO_OBJECT, reason)
+            empty = Observation(np.empty((0, 3), np.float32), model.camera)
+            return [ObjectEstimate(none, empty, nothing, False)]
+        estimates = self.estimator.estimate_all([view.observation for view in views])
+        return [
+            ObjectEstimate(estimate, *view)
+            for estimate, view in zip(estimates, views, strict=True)
+        ]
+
+    def _find_camera(
+        self,
+        points: NDArray[np.float32],
+        to_world: NDArray[np.float64],
+        pose: NDArray[np.float64],
+    ) -> Camera | None:
+        """Return the camera that an organised cloud shows, if it does."""
+        if points.ndim != 3:
+            return None
+        return camera_of_points(points, np.linalg.inv(pose) @ to_world, pose)
+
+    def _canonical_view(self, seen: NDArray[np.float32], pose: NDArray[np.float64]) -> Camera:
+        """Return a camera with the canonical view, as fine as an object's points are dense."""
+        return camera_as_dense(seen, replace(self.estimator.model.camera, pose=pose))

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import Shape, cuboids
-from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.image import Image, may_hide
 from kmn_perception.refinement.view import View, meet, meet_any, view_of
 
 
@@ -83,7 +83,9 @@ def support(view: View, image: Image, body: int) -> float:
                 if other != body:
                     inverse, _ = meet(solids, other, u, v)
                     behind = max(behind, inverse)
-            seen = inverse_depth[row, column]
+            seen = float(inverse_depth[row, column])
+            if seen <= 0.0 and may_hide(seen, nearest, 0.0):
+                continue
             count += 1
             if 0.5 * (nearest + behind) < seen < 1.5 * nearest - 0.5 * behind:
                 shown += 1

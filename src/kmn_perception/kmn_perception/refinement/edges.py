@@ -147,13 +147,17 @@ def _add_edge(
                 lines, faces, edge, start, step, a, rows, evidence[:count], sharpness,
                 _taper(a, low + border, high - border, border), moment, force, sums,
             )  # fmt: skip
-        behind = split(evidence[:count])
-        has_step = 0 < behind < count
+        fewest, most_behind = split(evidence[:count])
+        behind = (position - start) * step + 0.5
+        has_step = fewest > 0 and most_behind < count
         clipped = start == 0 or start == width - 1
         if has_step:
             found += 1
-        elif noise > 0.0 or (behind == 0 and clipped):
+        elif noise > 0.0 or (most_behind == 0 and clipped):
             continue
+        if fewest < behind < most_behind:
+            continue  # nothing is known that the edge contradicts
+        behind = min(max(behind, fewest), most_behind)
         at = start + step * (behind - 0.5)
         u, v = (at, float(a)) if rows else (float(a), at)
         distance = line[0] * u + line[1] * v + line[2]

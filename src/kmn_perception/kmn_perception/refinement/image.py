@@ -21,7 +21,9 @@ class Image(NamedTuple):
     Attributes
     ----------
     inverse_depth
-        (height, width) 1 / m; 0 where nothing was seen.
+        (height, width) 1 / m where the object was seen. Elsewhere it is the negative of the inverse
+        depth up to which the pixel was seen to be empty: 0 for all of its line of sight, minus
+        infinity where nothing is known.
     pixels
         (N, 3) u, v and inverse depth of all that was seen.
     projection
@@ -48,7 +50,11 @@ def image_of(observation: Observation) -> Image:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
-    inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    if observation.free_depth is None:
+        inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    else:
+        with np.errstate(divide="ignore"):
+            inverse_depth = np.float32(-1.0) / observation.free_depth
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
@@ -61,6 +67,20 @@ def image_of(observation: Observation) -> Image:
         1.0 / max(camera.near, LEAST_RANGE),
         1.0 / camera.far,
     )
+
+
+@njit(cache=True, error_model="numpy")
+def may_hide(seen: float, inverse_depth: float, margin: float) -> bool:
+    """Tell whether something may be at an inverse depth, though the pixel does not show it.
+
+    Parameters
+    ----------
+    seen
+        The pixel's value in `Image.inverse_depth`, not positive.
+    margin
+        Metres by which something must be before what was seen, so as not to be hidden by it.
+    """
+    return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen - margin
 
 
 @njit(cache=True)

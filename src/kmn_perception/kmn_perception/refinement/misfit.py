@@ -6,10 +6,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.image import Image, may_hide
 from kmn_perception.refinement.view import View, meet_any
 
 MOST = 15  # times as many pixels as asked for are looked at in all
+MARGIN = 0.01  # metres; the model must be so much before what is seen instead of it
 DIGITS = 6  # of the share; less is the rounding of the points
 
 
@@ -19,7 +20,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 
     A pixel that shows something where the model has nothing, or the other way round, counts 1, and
     a wrong depth its square, up to 1; the sum is divided by the number of pixels seen. Where the
-    model is out of the sensor's range, nothing need be seen.
+    model is out of the sensor's range or may be hidden, nothing need be seen.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
-    """Return the number of pixels that show nothing, though the model is there."""
+    """Return the number of pixels that were seen to be empty, though the model is there."""
     inverse_depth = image.inverse_depth
     height, width = inverse_depth.shape
     left, right = max(solids[:, 0].min(), 0.0), min(solids[:, 1].max(), width - 1.0)
@@ -58,8 +59,10 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
     unseen = 0
     for row in range(int(np.ceil(top / step)) * step, int(bottom) + 1, step):
         for column in range(int(np.ceil(left / step)) * step, int(right) + 1, step):
-            if inverse_depth[row, column] == 0.0:
-                unseen += _predicted(solids, image, float(column), float(row)) > 0.0
+            seen = float(inverse_depth[row, column])
+            if seen <= 0.0:
+                predicted = _predicted(solids, image, float(column), float(row))
+                unseen += predicted > 0.0 and not may_hide(seen, predicted, MARGIN)
     return float(unseen * step**2)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.image import may_hide
 from kmn_perception.refinement.view import meet
 
 CERTAIN = 5.0  # standard deviations that tell two depths apart
@@ -118,8 +119,8 @@ def _evidence(
             if met > expected:
                 return 0.0
             behind = max(behind, met)
-    if seen == 0.0:
-        return -certain
+    if seen <= 0.0:
+        return 0.0 if may_hide(seen, expected, settings.contrast) else -certain
     depth = 1.0 / seen - 1.0 / expected
     if depth < -settings.occluder and seen > expected + CERTAIN * depth_noise:
         return 0.0
@@ -161,15 +162,20 @@ def half_chord(
 
 
 @njit(cache=True, error_model="numpy")
-def split(evidence: NDArray[np.float64]) -> int:
-    """Return how many pixels, from outside, to put behind so that the fewest are wrong."""
+def split(evidence: NDArray[np.float64]) -> tuple[int, int]:
+    """Return how many pixels, from outside, to put behind so that the fewest are wrong.
+
+    The least and the largest number differ where nothing is known of the pixels between them.
+    """
     cost = 0
     for k in range(evidence.shape[0]):
         if evidence[k] < 0.0:
             cost += 1
-    least, best = cost, 0
+    cheapest, first, last = cost, 0, 0
     for k in range(evidence.shape[0]):
         cost += int(np.sign(evidence[k]))
-        if cost < least:
-            least, best = cost, k + 1
-    return best
+        if cost < cheapest:
+            cheapest, first, last = cost, k + 1, k + 1
+        elif cost == cheapest and last == k and evidence[k] == 0.0:
+            last = k + 1
+    return first, last

@@ -1,0 +1,153 @@
+"""Reference poses and sizes of labelled cartons by plane fits; for evaluation only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.camera import Camera
+from kmn_perception.evaluation.visible_fraction import visible_fraction
+from kmn_perception.frames.faces import SIDES, TOP, Faces, axial_noise, fit_faces
+from kmn_perception.frames.labelled_frame import TABLE, LabelledFrame
+from kmn_perception.frames.outline import Edge, Outline, Plane, find_edge, find_outline
+from kmn_perception.frames.settings import FaceSettings, FramesSettings, OutlineSettings
+from kmn_perception.frames.upright_box import UprightBox
+from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.support_plane import SupportPlane, pose_above
+
+TABLE_STEPS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A labelled carton as measured.
+
+    Attributes
+    ----------
+    label
+        In the frame.
+    box
+        In the world of `References.camera`; it stands on z = 0. A side that is not in view lies
+        where the labelled points end.
+    yaw_deviation
+        Standard deviation, radians.
+    side_deviations
+        (5,) standard deviations of the sides -x, +x, -y, +y, top (of the box's own axes), metres;
+        infinite for sides that are not in view.
+    visible
+        Share of its silhouette that is labelled.
+    """
+
+    label: int
+    box: UprightBox
+    yaw_deviation: float
+    side_deviations: NDArray[np.float64]
+    visible: float
+
+    @property
+    def in_view(self) -> NDArray[np.bool_]:
+        """(5,) the sides whose place is seen."""
+        return np.isfinite(self.side_deviations)
+
+    @property
+    def sizes_in_view(self) -> NDArray[np.bool_]:
+        """(3,) the sizes whose sides are both seen; the bottom stands on the table."""
+        seen = self.in_view
+        return np.array([seen[0] & seen[1], seen[2] & seen[3], seen[TOP]])
+
+
+class References(NamedTuple):
+    """All cartons of a frame, and the camera with its pose above the table."""
+
+    camera: Camera
+    boxes: list[Reference]
+
+
+def measure(frame: LabelledFrame, settings: FramesSettings, heading: NDArray[np.float64]) -> References:
+    """Measure every labelled carton of a frame.
+
+    The table is z = 0 and gives gravity. The faces in view give yaw and planes, at right angles.
+    Where the face beyond is not in view, a side is where the faces beside it end in the image.
+
+    Parameters
+    ----------
+    heading
+        (4, 4) pose whose ground position and heading the camera is given, which no frame shows.
+    """
+    points = depth_to_points(frame.depth, settings.camera).astype(np.float64)
+    table = _fit_table(points[frame.labels == TABLE], settings.faces)
+    camera = replace(settings.camera, pose=pose_above(table, heading))
+    world = points @ camera.pose[:3, :3].T + camera.pose[:3, 3]
+    boxes = []
+    for label in frame.objects:
+        mask = (frame.labels == label) & np.isfinite(frame.depth)
+        faces = fit_faces(world, frame.depth.astype(np.float64), mask, settings.faces)
+        if faces is not None:
+            outline = find_outline(mask, frame.depth, camera, settings.outline)
+            boxes.append(_reference(label, world[mask], mask, faces, outline, camera, settings))
+    return References(camera, boxes)
+
+
+def _fit_table(points: NDArray[np.float64], settings: FaceSettings) -> SupportPlane:
+    """Fit a plane to points (N, 3) in the optical frame, each by its own noise."""
+    exact = 1.0 / axial_noise(points[:, 2], settings)
+    weight = exact.copy()
+    for _ in range(TABLE_STEPS):
+        centre = np.average(points, axis=0, weights=weight**2)
+        offsets = (points - centre) * weight[:, None]
+        normal = np.linalg.eigh(offsets.T @ offsets)[1][:, 0]
+        residual = (points - centre) @ normal * exact
+        weight = exact * (np.abs(residual) < settings.outlier)
+    if normal @ centre > 0.0:
+        normal = -normal
+    return SupportPlane(normal, float(-normal @ centre))
+
+
+def _reference(
+    label: int, points: NDArray[np.float64], mask: NDArray[np.bool_], faces: Faces,
+    outline: Outline, camera: Camera, settings: FramesSettings,
+) -> Reference:
+    offsets, deviations = faces.offsets.copy(), faces.deviations.copy()
+    axes = faces.axes
+    ends = (points - [*faces.origin, 0.0]) @ axes.T
+    for side in np.flatnonzero(np.isnan(offsets)):
+        edge = _side_from_edges(int(side), faces, outline, camera, settings.outline)
+        if edge is None:
+            extreme = np.max if side % 2 or side == TOP else np.min
+            edge = Edge(float(extreme(ends[:, side // 2])), np.inf)
+        offsets[side], deviations[side] = edge
+    low, high = np.array([offsets[0], offsets[2], 0.0]), np.array([*offsets[[1, 3]], offsets[TOP]])
+    centre = (low + high) / 2.0 @ axes + [*faces.origin, 0.0]
+    box = UprightBox(centre, high - low, faces.yaw)
+    silhouette = np.isfinite(render(box.unit_cube[None], camera))
+    share = float((mask & silhouette).sum() / max(silhouette.sum(), 1))
+    visible = share * visible_fraction(box.unit_cube[None], camera)
+    return Reference(label, box, faces.yaw_deviation, deviations, visible)
+
+
+def _side_from_edges(
+    side: int, faces: Faces, outline: Outline, camera: Camera, settings: OutlineSettings
+) -> Edge | None:
+    """Return where the faces beside a side end, from all that show it."""
+    axes = faces.axes
+    outwards = axes[side // 2] * (1.0 if side % 2 or side == TOP else -1.0)
+    found = []
+    for other in np.flatnonzero(np.isfinite(faces.offsets)):
+        if other // 2 == side // 2:
+            continue
+        axis = axes[other // 2]
+        plane = Plane(axis, float(faces.offsets[other] + axis[:2] @ faces.origin))
+        edge = find_edge(outline, camera, plane, outwards, settings)
+        if edge is not None:
+            found.append(edge)
+    if not found:
+        return None
+    coordinate, deviation = np.array(found).T
+    weight = deviation**-2.0
+    sign = outwards @ axes[side // 2]
+    mean = sign * np.average(coordinate, weights=weight) - axes[side // 2, :2] @ faces.origin
+    disagreement = float(np.ptp(coordinate)) / 2.0
+    return Edge(float(mean), float(np.hypot(weight.sum() ** -0.5, disagreement)))

@@ -1,0 +1,89 @@
+"""How far each pixel of a sensor saw: what is seen to be empty, and what is not known."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+UNKNOWN, EMPTY = 0.0, np.inf  # metres
+BORDER_RUN = 8  # pixels at the image's sides that a sensor may not measure at all
+
+
+def free_depth(
+    points: NDArray[np.float32],
+    to_camera: NDArray[np.float64],
+    to_world: NDArray[np.float64],
+    floor: float,
+) -> NDArray[np.float32]:
+    """Return the depth (height, width) up to which each pixel sees nothing, metres.
+
+    It is that of what is measured; infinite for the support, since no object is below it. Where
+    nothing was measured, it is the larger one of those beside the gap in the same row: a sensor
+    with a projector beside it does not measure in the shadow that something near throws on
+    something far, so that the gap may hide the far thing, but not the near one. A wide gap up to
+    the image's border shows nothing in range, of a narrow one nothing is known.
+
+    Parameters
+    ----------
+    points
+        (height, width, 3) metres, NaN for none.
+    to_camera, to_world
+        (4, 4) transformations of the points to the optical frame and to the world frame.
+    floor
+        World height in metres of what belongs to the support.
+    """
+    return _free_depth(points, to_camera[2].copy(), to_world[2].copy(), floor)
+
+
+@njit(cache=True)
+def _free_depth(
+    points: NDArray[np.float32],
+    to_depth: NDArray[np.float64],
+    to_height: NDArray[np.float64],
+    floor: float,
+) -> NDArray[np.float32]:
+    height, width, _ = points.shape
+    free = np.empty((height, width), dtype=np.float32)
+    for row in range(height):
+        last, left = -1, 0.0
+        for column in range(width):
+            depth = _along(to_depth, points[row, column])
+            if not np.isfinite(depth):
+                continue
+            _fill(free[row], last + 1, column, left, depth)
+            on_support = _along(to_height, points[row, column]) <= floor
+            free[row, column] = EMPTY if on_support else depth
+            last, left = column, depth
+        _fill(free[row], last + 1, width, left, UNKNOWN)
+    return free
+
+
+@njit(cache=True)
+def _along(row: NDArray[np.float64], point: NDArray[np.float32]) -> float:
+    """Return one coordinate of a transformed point."""
+    return float(row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + row[3])
+
+
+@njit(cache=True)
+def _fill(free: NDArray[np.float32], start: int, stop: int, left: float, right: float) -> None:
+    """Fill a gap between two depths, one of which is unknown at the image's border."""
+    if left != UNKNOWN and right != UNKNOWN:
+        free[start:stop] = max(left, right)
+    else:
+        free[start:stop] = EMPTY if stop - start > BORDER_RUN else UNKNOWN
+
+
+@njit(cache=True)
+def touches_unseen(mask: NDArray[np.bool_], free: NDArray[np.float32]) -> bool:
+    """Tell whether an object's pixels reach the image's border or pixels of which none is known."""
+    height, width = mask.shape
+    for row in range(height):
+        for column in range(width):
+            if not mask[row, column]:
+                continue
+            if row in (0, height - 1) or column in (0, width - 1):
+                return True
+            if free[row, column - 1] == UNKNOWN or free[row, column + 1] == UNKNOWN:
+                return True
+    return False

@@ -74,7 +74,9 @@ def smoothed_normals(
 
 
 def fit_faces(
-    points: NDArray[np.float64], depth: NDArray[np.float64], mask: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    mask: NDArray[np.bool_],
     settings: FaceSettings,
 ) -> Faces | None:
     """Fit the faces of the box that the masked points show.
@@ -107,12 +109,16 @@ def fit_faces(
     faces = Faces(origin, yaw, np.nan, np.full(5, np.nan), np.full(5, np.nan))
     for _ in range(settings.steps):
         belongs = _assign(p, n, sigma, faces, settings)
+        belongs = _away_from_corners(p, belongs, faces, settings)
         faces = _step(p, sigma, blocks, belongs, faces, settings)
     return None if np.isnan(faces.offsets[:TOP]).all() else faces
 
 
 def _assign(
-    p: NDArray[np.float64], n: NDArray[np.float64], sigma: NDArray[np.float64], faces: Faces,
+    p: NDArray[np.float64],
+    n: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    faces: Faces,
     settings: FaceSettings,
 ) -> NDArray[np.int64]:
     """Return the face (N,) that each point lies on, by its normal and its distance."""
@@ -131,9 +137,27 @@ def _assign(
     return belongs
 
 
+def _away_from_corners(
+    p: NDArray[np.float64], belongs: NDArray[np.int64], faces: Faces, settings: FaceSettings
+) -> NDArray[np.int64]:
+    """Take points near other faces from their face: a sensor's windows round the corners off."""
+    kept = belongs.copy()
+    for side in np.flatnonzero(np.isfinite(faces.offsets)):
+        near = np.abs(p @ faces.axes[side // 2] - faces.offsets[side]) < settings.corner
+        for other in np.unique(belongs):
+            away = (belongs == other) & ~near
+            if other // 2 != side // 2 and away.sum() >= settings.min_pixels:
+                kept[(belongs == other) & near] = NOWHERE
+    return kept
+
+
 def _step(
-    p: NDArray[np.float64], sigma: NDArray[np.float64], blocks: NDArray[np.int64],
-    belongs: NDArray[np.int64], faces: Faces, settings: FaceSettings,
+    p: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    blocks: NDArray[np.int64],
+    belongs: NDArray[np.int64],
+    faces: Faces,
+    settings: FaceSettings,
 ) -> Faces:
     """Fit yaw and offsets to the assigned points: one Gauss-Newton step from the present yaw.
 
@@ -158,6 +182,23 @@ def _step(
     np.add.at(sums, group, scores)
     deviation = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse))
     offsets, deviations = np.full(5, np.nan), np.full(5, np.nan)
-    offsets[seen], deviations[seen] = solution[1:], np.hypot(deviation[1:], settings.depth_error)
+    calibration = np.full(len(seen), settings.depth_error)
+    upright = seen != TOP
+    calibration[upright] += settings.narrow_error / _widths(q, side, seen[upright], axes)
+    offsets[seen], deviations[seen] = solution[1:], np.hypot(deviation[1:], calibration)
     yaw_deviation = float(np.hypot(deviation[0], settings.yaw_error))
     return Faces(faces.origin, faces.yaw + float(solution[0]), yaw_deviation, offsets, deviations)
+
+
+def _widths(
+    q: NDArray[np.float64],
+    side: NDArray[np.int64],
+    seen: NDArray[np.int64],
+    axes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return how far the points of each face reach, along the shorter of its directions."""
+    widths = []
+    for face in seen:
+        reach = np.ptp(np.percentile(q[side == face] @ axes.T, [2, 98], axis=0), axis=0)
+        widths.append(np.delete(reach, face // 2).min())
+    return np.array(widths)

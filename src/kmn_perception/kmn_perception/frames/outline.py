@@ -62,8 +62,12 @@ def find_outline(
 
 
 def _outline_along(
-    step: tuple[int, int], mask: NDArray[np.bool_], depth: NDArray[np.float32],
-    outward: NDArray[np.float64], camera: Camera, settings: OutlineSettings,
+    step: tuple[int, int],
+    mask: NDArray[np.bool_],
+    depth: NDArray[np.float32],
+    outward: NDArray[np.float64],
+    camera: Camera,
+    settings: OutlineSettings,
 ) -> Outline:
     du, dv = step
     height, width = mask.shape
@@ -102,7 +106,10 @@ def _rays(u: NDArray[np.float64], v: NDArray[np.float64], camera: Camera) -> NDA
 
 
 def find_edge(
-    outline: Outline, camera: Camera, plane: Plane, outwards: NDArray[np.float64],
+    outline: Outline,
+    camera: Camera,
+    plane: Plane,
+    outwards: NDArray[np.float64],
     settings: OutlineSettings,
 ) -> Edge | None:
     """Return where a face ends in a direction, or None where that is not seen.
@@ -124,7 +131,8 @@ def find_edge(
         behind = reach / (outline.beyond_rays @ rotation.T @ plane.normal)
     points = outline.rays * depths[:, None]  # in the optical frame
     across, along = rotation.T @ outwards, rotation.T @ np.cross(plane.normal, outwards)
-    normal = _perpendicular(_flow(points, along, camera), _flow(points, across, camera))
+    flow = _flow(points, across, camera)
+    normal = _perpendicular(_flow(points, along, camera), flow)
     with np.errstate(invalid="ignore"):
         fits = np.sum(normal * outline.normals, axis=1) > settings.cosine
         fits &= np.abs(depths - outline.depths) < settings.near_face
@@ -140,26 +148,25 @@ def find_edge(
     if near.sum() < settings.min_pixels:
         return None
     spread = float(np.std(coordinates[near]) / np.sqrt(near.sum() / settings.correlated))
-    pixel = settings.pixel_error * float(np.median(found[near, 2])) / camera.fx
+    pixels_per_metre = np.sum(flow * normal, axis=1)[fits][near]
+    pixel = settings.pixel_error / float(np.median(pixels_per_metre))
     return Edge(float(np.median(coordinates[near])), float(np.hypot(spread, pixel)))
 
 
 def _flow(
     points: NDArray[np.float64], direction: NDArray[np.float64], camera: Camera
 ) -> NDArray[np.float64]:
-    """Return the direction (N, 2) in which points (N, 3) move in the image."""
+    """Return by how many pixels (N, 2) points (N, 3) move in the image for each metre."""
     x, y, z = points.T
     return np.column_stack(
         [
-            camera.fx * (direction[0] * z - x * direction[2]),
-            camera.fy * (direction[1] * z - y * direction[2]),
+            camera.fx * (direction[0] - x / z * direction[2]) / z,
+            camera.fy * (direction[1] - y / z * direction[2]) / z,
         ]
     )
 
 
-def _perpendicular(
-    along: NDArray[np.float64], across: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _perpendicular(along: NDArray[np.float64], across: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the unit vectors (N, 2) at right angles to one direction, on the side of another."""
     normal = np.column_stack([-along[:, 1], along[:, 0]])
     normal *= np.sign(np.sum(normal * across, axis=1))[:, None]

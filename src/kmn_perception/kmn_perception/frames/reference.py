@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.evaluation.visible_fraction import visible_fraction
-from kmn_perception.frames.faces import SIDES, TOP, Faces, axial_noise, fit_faces
+from kmn_perception.frames.faces import TOP, Faces, axial_noise, fit_faces
 from kmn_perception.frames.labelled_frame import TABLE, LabelledFrame
 from kmn_perception.frames.outline import Edge, Outline, Plane, find_edge, find_outline
 from kmn_perception.frames.settings import FaceSettings, FramesSettings, OutlineSettings
@@ -66,7 +66,9 @@ class References(NamedTuple):
     boxes: list[Reference]
 
 
-def measure(frame: LabelledFrame, settings: FramesSettings, heading: NDArray[np.float64]) -> References:
+def measure(
+    frame: LabelledFrame, settings: FramesSettings, heading: NDArray[np.float64]
+) -> References:
     """Measure every labelled carton of a frame.
 
     The table is z = 0 and gives gravity. The faces in view give yaw and planes, at right angles.
@@ -107,18 +109,26 @@ def _fit_table(points: NDArray[np.float64], settings: FaceSettings) -> SupportPl
 
 
 def _reference(
-    label: int, points: NDArray[np.float64], mask: NDArray[np.bool_], faces: Faces,
-    outline: Outline, camera: Camera, settings: FramesSettings,
+    label: int,
+    points: NDArray[np.float64],
+    mask: NDArray[np.bool_],
+    faces: Faces,
+    outline: Outline,
+    camera: Camera,
+    settings: FramesSettings,
 ) -> Reference:
     offsets, deviations = faces.offsets.copy(), faces.deviations.copy()
     axes = faces.axes
     ends = (points - [*faces.origin, 0.0]) @ axes.T
-    for side in np.flatnonzero(np.isnan(offsets)):
-        edge = _side_from_edges(int(side), faces, outline, camera, settings.outline)
-        if edge is None:
+    for side in range(5):
+        seen = _ends(side, faces, outline, camera, settings.outline)
+        if np.isfinite(offsets[side]):
+            seen.append(Edge(offsets[side], deviations[side]))
+        if seen:
+            offsets[side], deviations[side] = _combine(seen)
+        else:
             extreme = np.max if side % 2 or side == TOP else np.min
-            edge = Edge(float(extreme(ends[:, side // 2])), np.inf)
-        offsets[side], deviations[side] = edge
+            offsets[side], deviations[side] = extreme(ends[:, side // 2]), np.inf
     low, high = np.array([offsets[0], offsets[2], 0.0]), np.array([*offsets[[1, 3]], offsets[TOP]])
     centre = (low + high) / 2.0 @ axes + [*faces.origin, 0.0]
     box = UprightBox(centre, high - low, faces.yaw)
@@ -128,26 +138,27 @@ def _reference(
     return Reference(label, box, faces.yaw_deviation, deviations, visible)
 
 
-def _side_from_edges(
+def _ends(
     side: int, faces: Faces, outline: Outline, camera: Camera, settings: OutlineSettings
-) -> Edge | None:
-    """Return where the faces beside a side end, from all that show it."""
-    axes = faces.axes
-    outwards = axes[side // 2] * (1.0 if side % 2 or side == TOP else -1.0)
+) -> list[Edge]:
+    """Return where the faces beside a side end, as its coordinates along its axis of the box."""
+    axis, sign = faces.axes[side // 2], 1.0 if side % 2 or side == TOP else -1.0
+    start = axis[:2] @ faces.origin
     found = []
     for other in np.flatnonzero(np.isfinite(faces.offsets)):
-        if other // 2 == side // 2:
-            continue
-        axis = axes[other // 2]
-        plane = Plane(axis, float(faces.offsets[other] + axis[:2] @ faces.origin))
-        edge = find_edge(outline, camera, plane, outwards, settings)
-        if edge is not None:
-            found.append(edge)
-    if not found:
-        return None
-    coordinate, deviation = np.array(found).T
-    weight = deviation**-2.0
-    sign = outwards @ axes[side // 2]
-    mean = sign * np.average(coordinate, weights=weight) - axes[side // 2, :2] @ faces.origin
-    disagreement = float(np.ptp(coordinate)) / 2.0
-    return Edge(float(mean), float(np.hypot(weight.sum() ** -0.5, disagreement)))
+        if other // 2 != side // 2:
+            normal = faces.axes[other // 2]
+            plane = Plane(normal, float(faces.offsets[other] + normal[:2] @ faces.origin))
+            edge = find_edge(outline, camera, plane, sign * axis, settings)
+            if edge is not None:
+                found.append(Edge(sign * edge.coordinate - start, edge.deviation))
+    return found
+
+
+def _combine(measured: list[Edge]) -> Edge:
+    """Return the mean of all that shows a side; where they disagree, its deviation is as large."""
+    coordinates, deviations = np.array(measured).T
+    weights = deviations**-2.0
+    mean = np.average(coordinates, weights=weights)
+    scatter = np.average((coordinates - mean) ** 2, weights=weights)
+    return Edge(float(mean), float(np.sqrt(1.0 / weights.sum() + scatter)))

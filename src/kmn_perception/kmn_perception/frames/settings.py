@@ -10,7 +10,8 @@ from kmn_perception.configuration import Section
 
 FACE_COUNTS = ("normal_window", "normal_reach", "min_pixels", "steps", "block")
 FACE_NUMBERS = (
-    "normal_share", "level", "cosine", "outlier", "nearest", "depth_error", "yaw_error",
+    "normal_share", "level", "cosine", "outlier", "nearest", "corner", "depth_error",
+    "narrow_error", "yaw_error",
 )  # fmt: skip
 OUTLINE_COUNTS = ("shadow", "min_pixels")
 OUTLINE_NUMBERS = (
@@ -40,7 +41,9 @@ class FaceSettings:
     cosine: float
     outlier: float
     nearest: float
+    corner: float
     depth_error: float
+    narrow_error: float
     yaw_error: float
 
 

@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.evaluation.visible_fraction import visible_fraction
-from kmn_perception.frames.faces import TOP, Faces, axial_noise, fit_faces
+from kmn_perception.frames.faces import TOP, Faces, axial_noise, box_axes, fit_faces
 from kmn_perception.frames.labelled_frame import TABLE, LabelledFrame
 from kmn_perception.frames.outline import Edge, Outline, Plane, find_edge, find_outline
 from kmn_perception.frames.settings import FaceSettings, FramesSettings, OutlineSettings
-from kmn_perception.frames.upright_box import UprightBox
+from kmn_perception.frames.upright_box import QUARTER, UprightBox
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.support_plane import SupportPlane, pose_above
 
 TABLE_STEPS = 5
+QUARTER_TURN = [2, 3, 1, 0, TOP]  # the sides -x, +x, -y, +y, top after a quarter turn of the axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,46 @@ class Reference:
         """(3,) the sizes whose sides are both seen; the bottom stands on the table."""
         seen = self.in_view
         return np.array([seen[0] & seen[1], seen[2] & seen[3], seen[TOP]])
+
+    def as_near(self, box: UprightBox) -> Reference:
+        """Return the same, described with its axes as near as they can be to another box's."""
+        same, sides = self.box.as_near(box), self.side_deviations
+        for _ in range(round((same.yaw - self.box.yaw) / QUARTER) % 4):
+            sides = sides[QUARTER_TURN]
+        return replace(self, box=same, side_deviations=sides)
+
+    def seen_from(self, pose: NDArray[np.float64], other: NDArray[np.float64]) -> Reference:
+        """Return the same in another world, given the camera's pose (4, 4) in this one and that.
+
+        Both stand on the same support, so that they differ by next to nothing but a turn about z
+        and a shift.
+        """
+        change = other @ np.linalg.inv(pose)
+        centre = change[:3, :3] @ self.box.centre + change[:3, 3]
+        yaw = self.box.yaw + float(np.arctan2(change[1, 0], change[0, 0]))
+        return replace(self, box=replace(self.box, centre=centre, yaw=yaw))
+
+    def parameters(self, unseen: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return centre x, y, yaw and sizes x, y, z (6,) with their covariance (6, 6).
+
+        Parameters
+        ----------
+        unseen
+            Standard deviation of a side that is not in view, metres.
+        """
+        box = self.box
+        mean = np.array([*box.centre[:2], box.yaw, *box.size])
+        deviations = np.where(self.in_view, self.side_deviations, unseen)
+        axes = box_axes(box.yaw)[:2, :2]
+        slope = np.zeros((6, 6))  # by yaw and the five sides
+        slope[2, 0] = 1.0
+        for axis in range(2):
+            below, above = 1 + 2 * axis, 2 + 2 * axis
+            slope[:2, below] = slope[:2, above] = axes[axis] / 2.0
+            slope[3 + axis, below], slope[3 + axis, above] = -1.0, 1.0
+        slope[5, 1 + TOP] = 1.0
+        scaled = slope * [self.yaw_deviation, *deviations]
+        return mean, scaled @ scaled.T
 
 
 class References(NamedTuple):

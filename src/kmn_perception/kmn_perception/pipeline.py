@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
-from kmn_perception.free_depth import free_depth, touches_unseen
 from kmn_perception.intrinsics import camera_as_dense, camera_of_points
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, segment
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
+from kmn_perception.surroundings import surroundings, touches_unseen
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
 
@@ -102,8 +102,8 @@ class MorphPipeline:
         find_support_plane(points, self.settings.plane)
         for cloud in (points, points.reshape(-1, 3)):
             segment(cloud, model.camera.pose, np.zeros(3), self.settings.background)
-        free = free_depth(points, np.eye(4), model.camera.pose, 0.0)
-        touches_unseen(np.isfinite(points[..., 2]), free)
+        around = surroundings(points, np.eye(4), model.camera.pose, 0.0)
+        touches_unseen(np.isfinite(points[..., 2]), around.free_depth)
         self.estimator.warm_up()
 
     def estimate(self, points: NDArray[np.float32], in_world: bool = False) -> Estimate:
@@ -148,16 +148,16 @@ class MorphPipeline:
         to_world = np.eye(4) if in_world else pose
         segments = segment(points, to_world, pose[:3, 3], background)
         floor = background.plane_margin if background.remove_plane else -np.inf
-        camera, free = self._find_camera(points, to_world, pose), None
+        camera, around = self._find_camera(points, to_world, pose), None
         if camera is not None:
-            free = free_depth(points, camera.world_to_camera @ to_world, to_world, floor)
+            around = surroundings(points, camera.world_to_camera @ to_world, to_world, floor)
         views = []
         for label in range(segments.count)[:most]:
             seen = segments.of_object(label)
             mask = (segments.labels == label).reshape(points.shape[:-1])
             sensor = camera or self._canonical_view(seen, pose)
-            cut = free is not None and touches_unseen(mask, free)
-            views.append(ObjectView(Observation(seen, sensor, floor, free), mask, cut))
+            cut = around is not None and touches_unseen(mask, around.free_depth)
+            views.append(ObjectView(Observation(seen, sensor, floor, around), mask, cut))
         return views
 
     def camera_pose(

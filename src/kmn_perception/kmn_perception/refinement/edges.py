@@ -140,7 +140,7 @@ def _add_edge(
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(
-            solids, inverse_depth, settings, depth_noise, b, line[1 - along], at_edge, rows, a,
+            solids, inverse_depth, image.presumed, settings, depth_noise, b, line[1 - along], at_edge, rows, a,
             position, window, chord, evidence,
         )  # fmt: skip
         if count == 0:
@@ -229,7 +229,7 @@ def _add_probit(
         unlikely = 1.0 - likely
         push = density / likely
         information = density * push / unlikely
-        sums[0] -= weight * math.log(likely)
+        sums[0] -= weight * math.log(likely / sure)  # no pixel costs if it fits
         sums[1] += weight * t * push
         sums[2] += weight * t * t * information
         _add(moment, force, weight * information / noise**2, -weight * sign * push / noise, u, v)

@@ -24,6 +24,8 @@ class Image(NamedTuple):
         (height, width) 1 / m where the object was seen. Elsewhere it is the negative of the inverse
         depth up to which the pixel was seen to be empty: 0 for all of its line of sight, minus
         infinity where nothing is known.
+    presumed
+        (height, width) nothing was measured there.
     pixels
         (N, 3) u, v and inverse depth of all that was seen.
     projection
@@ -38,6 +40,7 @@ class Image(NamedTuple):
     """
 
     inverse_depth: NDArray[np.float32]
+    presumed: NDArray[np.bool_]
     pixels: NDArray[np.float32]
     projection: NDArray[np.float64]
     upwards: NDArray[np.float64]
@@ -50,16 +53,19 @@ def image_of(observation: Observation) -> Image:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
-    if observation.free_depth is None:
-        inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    shape = (camera.height, camera.width)
+    if observation.surroundings is None:
+        inverse_depth, presumed = np.zeros(shape, np.float32), np.zeros(shape, np.bool_)
     else:
+        presumed = observation.surroundings.presumed
         with np.errstate(divide="ignore"):
-            inverse_depth = np.float32(-1.0) / observation.free_depth
+            inverse_depth = np.float32(-1.0) / observation.surroundings.free_depth
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
     return Image(
         inverse_depth,
+        presumed,
         pixels,
         matrix,
         upwards,

@@ -31,6 +31,8 @@ class EdgeSettings(NamedTuple):
         Edges less than this above the floor are not used, metres.
     outliers
         Share of pixels that show anything.
+    presumed
+        Of the probability, where nothing was measured.
     """
 
     occluder: float
@@ -38,12 +40,14 @@ class EdgeSettings(NamedTuple):
     contrast: float
     floor_margin: float
     outliers: float
+    presumed: float
 
 
 @njit(cache=True, error_model="numpy")
 def scan(
     solids: NDArray[np.float64],
     inverse_depth: NDArray[np.float32],
+    presumed: NDArray[np.bool_],
     settings: EdgeSettings,
     depth_noise: float,
     b: int,
@@ -96,6 +100,8 @@ def scan(
         evidence[k] = _evidence(
             solids, settings, depth_noise, b, float(column), float(row), seen, expected
         )
+        if presumed[row, column]:
+            evidence[k] *= settings.presumed
     return start, step, count
 
 

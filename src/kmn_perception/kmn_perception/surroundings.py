@@ -6,19 +6,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.observation import Surroundings
+
 UNKNOWN, EMPTY = 0.0, np.inf  # metres
 BORDER_RUN = 8  # pixels at the image's sides that a sensor may not measure at all
 
 
-def free_depth(
+def surroundings(
     points: NDArray[np.float32],
     to_camera: NDArray[np.float64],
     to_world: NDArray[np.float64],
     floor: float,
-) -> NDArray[np.float32]:
-    """Return the depth (height, width) up to which each pixel sees nothing, metres.
+) -> Surroundings:
+    """Return up to which depth each pixel sees nothing.
 
-    It is that of what is measured; infinite for the support, since no object is below it. Where
+    It is the depth of what is measured; infinite for the support, since no object is below it. Where
     nothing was measured, it is the larger one of those beside the gap in the same row: a sensor
     with a projector beside it does not measure in the shadow that something near throws on
     something far, so that the gap may hide the far thing, but not the near one. A wide gap up to
@@ -33,7 +35,8 @@ def free_depth(
     floor
         World height in metres of what belongs to the support.
     """
-    return _free_depth(points, to_camera[2].copy(), to_world[2].copy(), floor)
+    free = _free_depth(points, to_camera[2].copy(), to_world[2].copy(), floor)
+    return Surroundings(free, np.isnan(points[..., 2]))
 
 
 @njit(cache=True)

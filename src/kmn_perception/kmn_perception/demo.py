@@ -21,7 +21,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
-from tqdm import tqdm
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception import resources
@@ -31,7 +30,7 @@ from kmn_perception.estimator import Status
 from kmn_perception.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
-from kmn_perception.overlay import Overlay, save_contact_sheet, save_picture
+from kmn_perception.overlay import Overlay, ShownObject, save_pictures
 from kmn_perception.pipeline import PipelineSettings
 from kmn_perception.rendering import depth_to_points
 from kmn_perception.replay import Replay
@@ -196,21 +195,15 @@ def draw_frames(
         yield Overlay(
             depth=depth,
             camera=replace(intrinsics, pose=pose),
-            points=remove_background(points, pose, pose[:3, 3], settings.background),
-            unit_cubes=answer.unit_cubes if answer else np.empty((0, 4, 4)),
-            accepted=answer is not None and answer.status is Status.OK,
+            objects=[
+                ShownObject(
+                    points=remove_background(points, pose, pose[:3, 3], settings.background),
+                    unit_cubes=answer.unit_cubes if answer else np.empty((0, 4, 4)),
+                    accepted=answer is not None and answer.status is Status.OK,
+                )
+            ],
             title=f"frame {number}: {texts.pop()}\n" + "\n".join(texts),
         )
-
-
-def save_pictures(overlays: Iterator[Overlay], count: int, folder: Path) -> Path:
-    """Write a picture of each frame, and one of all; return the latter's path."""
-    drawn = []
-    for number, overlay in enumerate(tqdm(overlays, "drawing", count, unit="frame")):
-        save_picture(folder / f"frame_{number:02d}.png", overlay)
-        drawn.append(overlay)
-    save_contact_sheet(folder / "all_frames.png", drawn)
-    return folder / "all_frames.png"
 
 
 def run(folder: Path) -> int:

@@ -19,11 +19,11 @@ MM = 1000.0  # OpenCV's rectangles are found in millimetres, for the sake of sin
 
 
 def open3d_box(points: NDArray[np.float32]) -> UprightBox:
-    """Return open3d's oriented bounding box, with the axis that is nearest to vertical as its z."""
+    """Return open3d's smallest oriented bounding box, with the axis that is nearest to vertical as its z."""
     import open3d
 
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(np.float64)))
-    box = cloud.get_oriented_bounding_box()
+    box = cloud.get_minimal_oriented_bounding_box()
     up = int(np.argmax(np.abs(box.R[2])))
     first, second = (axis for axis in range(3) if axis != up)
     yaw = float(np.arctan2(box.R[1, first], box.R[0, first]))

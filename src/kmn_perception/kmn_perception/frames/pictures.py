@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kmn_perception.estimator import Status
 from kmn_perception.frames.experiment import FrameResult
@@ -33,7 +34,7 @@ def draw(
 
 def _show(found: ObjectEstimate, model: KinematicModel) -> ShownObject:
     estimate = found.estimate
-    cubes = np.empty((0, 4, 4))
+    cubes: NDArray[np.float64] = np.empty((0, 4, 4))
     if np.isfinite(estimate.theta).all():
         cubes = model.unit_cubes(estimate.theta, estimate.gamma)
     return ShownObject(found.observation.points, cubes, estimate.status is Status.OK)

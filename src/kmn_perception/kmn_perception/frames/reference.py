@@ -39,7 +39,8 @@ class Reference:
         (5,) standard deviations of the sides -x, +x, -y, +y, top (of the box's own axes), metres;
         infinite for sides that are not in view.
     visible
-        Share of its silhouette that is labelled.
+        Share of its silhouette that is labelled; of a box with sides that are not in view, the
+        silhouette of the part that is known.
     """
 
     label: int
@@ -120,13 +121,14 @@ def measure(
     heading
         (4, 4) pose whose ground position and heading the camera is given, which no frame shows.
     """
+    measured = np.isfinite(frame.depth)
     points = depth_to_points(frame.depth, settings.camera).astype(np.float64)
-    table = _fit_table(points[frame.labels == TABLE], settings.faces)
+    table = _fit_table(points[(frame.labels == TABLE) & measured], settings.faces)
     camera = replace(settings.camera, pose=pose_above(table, heading))
     world = points @ camera.pose[:3, :3].T + camera.pose[:3, 3]
     boxes = []
     for label in frame.objects:
-        mask = (frame.labels == label) & np.isfinite(frame.depth)
+        mask = (frame.labels == label) & measured
         faces = fit_faces(world, frame.depth.astype(np.float64), mask, settings.faces)
         if faces is not None:
             outline = find_outline(mask, frame.depth, camera, settings.outline)
@@ -158,18 +160,12 @@ def _reference(
     camera: Camera,
     settings: FramesSettings,
 ) -> Reference:
-    offsets, deviations = faces.offsets.copy(), faces.deviations.copy()
+    offsets, deviations = _sides(faces, outline, camera, settings.outline)
     axes = faces.axes
     ends = (points - [*faces.origin, 0.0]) @ axes.T
-    for side in range(5):
-        seen = _ends(side, faces, outline, camera, settings.outline)
-        if np.isfinite(offsets[side]):
-            seen.append(Edge(offsets[side], deviations[side]))
-        if seen:
-            offsets[side], deviations[side] = _combine(seen)
-        else:
-            extreme = np.max if side % 2 or side == TOP else np.min
-            offsets[side], deviations[side] = extreme(ends[:, side // 2]), np.inf
+    for side in np.flatnonzero(np.isnan(offsets)):
+        extreme = np.max if side % 2 or side == TOP else np.min
+        offsets[side], deviations[side] = extreme(ends[:, side // 2]), np.inf
     low, high = np.array([offsets[0], offsets[2], 0.0]), np.array([*offsets[[1, 3]], offsets[TOP]])
     centre = (low + high) / 2.0 @ axes + [*faces.origin, 0.0]
     box = UprightBox(centre, high - low, faces.yaw)
@@ -179,17 +175,44 @@ def _reference(
     return Reference(label, box, faces.yaw_deviation, deviations, visible)
 
 
+def _sides(
+    faces: Faces, outline: Outline, camera: Camera, settings: OutlineSettings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return place and standard deviation of the sides (5,); NaN for those that are not seen.
+
+    First, faces end where a side is. A side that is seen, but too narrow for a face of its own,
+    then shows where the plane of the side behind ends.
+    """
+    offsets, deviations = faces.offsets.copy(), faces.deviations.copy()
+    for side in range(5):
+        seen = _ends(side, faces.offsets, faces, outline, camera, settings)
+        if np.isfinite(offsets[side]):
+            seen.append(Edge(offsets[side], deviations[side]))
+        if seen:
+            offsets[side], deviations[side] = _combine(seen)
+    for side in np.flatnonzero(np.isnan(offsets)):
+        seen = _ends(int(side), offsets, faces, outline, camera, settings)
+        if seen:
+            offsets[side], deviations[side] = _combine(seen)
+    return offsets, deviations
+
+
 def _ends(
-    side: int, faces: Faces, outline: Outline, camera: Camera, settings: OutlineSettings
+    side: int,
+    planes: NDArray[np.float64],
+    faces: Faces,
+    outline: Outline,
+    camera: Camera,
+    settings: OutlineSettings,
 ) -> list[Edge]:
-    """Return where the faces beside a side end, as its coordinates along its axis of the box."""
+    """Return where the planes beside a side end, as its coordinates along its axis of the box."""
     axis, sign = faces.axes[side // 2], 1.0 if side % 2 or side == TOP else -1.0
     start = axis[:2] @ faces.origin
     found = []
-    for other in np.flatnonzero(np.isfinite(faces.offsets)):
+    for other in np.flatnonzero(np.isfinite(planes)):
         if other // 2 != side // 2:
             normal = faces.axes[other // 2]
-            plane = Plane(normal, float(faces.offsets[other] + normal[:2] @ faces.origin))
+            plane = Plane(normal, float(planes[other] + normal[:2] @ faces.origin))
             edge = find_edge(outline, camera, plane, sign * axis, settings)
             if edge is not None:
                 found.append(Edge(sign * edge.coordinate - start, edge.deviation))

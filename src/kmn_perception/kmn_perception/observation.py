@@ -31,6 +31,12 @@ class Surroundings(NamedTuple):
     presumed: NDArray[np.bool_]
 
 
+def empty_surroundings(height: int, width: int) -> Surroundings:
+    """Return what a sensor saw that saw nothing else."""
+    free_depth = np.full((height, width), np.inf, dtype=np.float32)
+    return Surroundings(free_depth, np.zeros((height, width), dtype=np.bool_))
+
+
 @dataclass(frozen=True, eq=False)
 class Observation:
     """An object's points, and from where they were seen.

@@ -51,7 +51,7 @@ class PipelineSettings:
     background: SegmentationSettings
 
 
-class NoCameraPoseError(Exception):
+class NoCameraPoseError(ValueError):
     """The camera's pose cannot be found; the text says why."""
 
 
@@ -152,7 +152,7 @@ class MorphPipeline:
         if camera is not None:
             around = surroundings(points, camera.world_to_camera @ to_world, to_world, floor)
         views = []
-        for label in range(segments.count)[:most]:
+        for label in range(segments.objects)[:most]:
             seen = segments.of_object(label)
             mask = (segments.labels == label).reshape(points.shape[:-1])
             sensor = camera or self._canonical_view(seen, pose)
@@ -205,8 +205,7 @@ class MorphPipeline:
             return [ObjectEstimate(none, empty, nothing, False)]
         estimates = self.estimator.estimate_all([view.observation for view in views])
         return [
-            ObjectEstimate(estimate, *view)
-            for estimate, view in zip(estimates, views, strict=True)
+            ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
         ]
 
     def _find_camera(

@@ -64,13 +64,13 @@ class Segments(NamedTuple):
         (N, 3) all points in the world frame, metres; NaN for none.
     labels
         (N,) of the objects 0, 1, ..., the nearest first; -1 for other points.
-    count
+    objects
         Number of objects.
     """
 
     points: NDArray[np.float32]
     labels: NDArray[np.int32]
-    count: int
+    objects: int
 
     def of_object(self, label: int) -> NDArray[np.float32]:
         """Return the points (M, 3) of an object."""
@@ -249,7 +249,7 @@ def _sort(
     viewpoint: NDArray[np.float64],
     min_points: int,
 ) -> tuple[NDArray[np.int32], int]:
-    """Number the large clusters by their mean distance; return the labels and their count."""
+    """Return the labels of the large clusters, ordered by mean distance, and their number."""
     counts = np.zeros(labels.max() + 1, dtype=np.int64)
     distances = np.zeros(len(counts))
     for i in range(len(labels)):

@@ -20,9 +20,9 @@ def surroundings(
 ) -> Surroundings:
     """Return up to which depth each pixel sees nothing.
 
-    It is the depth of what is measured; infinite for the support, since no object is below it. Where
-    nothing was measured, it is the larger one of those beside the gap in the same row: a sensor
-    with a projector beside it does not measure in the shadow that something near throws on
+    It is the depth of what is measured; infinite for the support, since no object is below it.
+    Where nothing was measured, it is the larger one of those beside the gap in the same row: a
+    sensor with a projector beside it does not measure in the shadow that something near throws on
     something far, so that the gap may hide the far thing, but not the near one. A wide gap up to
     the image's border shows nothing in range, of a narrow one nothing is known.
 

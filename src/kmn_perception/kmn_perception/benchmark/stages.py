@@ -49,15 +49,16 @@ def chain(
         markers_from_estimate(model, estimate, cloud.header)
 
     points = message_to_array()
-    observation = pipeline.observe(points)
-    if observation is None or not len(observation.points):
+    views = pipeline.observe(points, most=1)
+    if not views:
         raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
+    observation = views[0].observation
     seen, first = [observation], network.start([observation])
     images = network.render_anew(0, seen, first)
     predicted, _ = predict(network, seen, STEPS)
     return {
         "message_to_array": message_to_array,
-        "background_removal": lambda: pipeline.observe(points),
+        "background_removal": lambda: pipeline.observe(points, most=1),
         "splat": lambda: network.render_anew(0, seen, first),
         "network": lambda: network.predict(0, images),
         "predictions": lambda: predict(network, seen, STEPS),

@@ -140,8 +140,8 @@ def _add_edge(
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(
-            solids, inverse_depth, image.presumed, settings, depth_noise, b, line[1 - along], at_edge, rows, a,
-            position, window, chord, evidence,
+            solids, inverse_depth, image.presumed, settings, depth_noise, b, line[1 - along],
+            at_edge, rows, a, position, window, chord, evidence,
         )  # fmt: skip
         if count == 0:
             continue

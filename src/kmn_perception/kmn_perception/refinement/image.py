@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.observation import Observation
+from kmn_perception.observation import Observation, empty_surroundings
 from kmn_perception.refinement.view import projection
 
 HALF = 0.5
@@ -53,19 +53,17 @@ def image_of(observation: Observation) -> Image:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
-    shape = (camera.height, camera.width)
-    if observation.surroundings is None:
-        inverse_depth, presumed = np.zeros(shape, np.float32), np.zeros(shape, np.bool_)
-    else:
-        presumed = observation.surroundings.presumed
-        with np.errstate(divide="ignore"):
-            inverse_depth = np.float32(-1.0) / observation.surroundings.free_depth
+    around = observation.surroundings
+    if around is None:
+        around = empty_surroundings(camera.height, camera.width)
+    with np.errstate(divide="ignore"):
+        inverse_depth = np.float32(-1.0) / around.free_depth
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
     return Image(
         inverse_depth,
-        presumed,
+        around.presumed,
         pixels,
         matrix,
         upwards,

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.correlation import alike
+from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.view import PLANES, View, add_normal_equations, meet_any
 
 LAGS = 8  # rows that may be shifted alike
@@ -108,7 +108,10 @@ def plane_terms(
                 continue
             moment, force = moments[body, face], forces[body, face]
             moment[1, 0], moment[2, 0], moment[2, 1] = moment[0, 1], moment[0, 2], moment[1, 2]
-            in_rows, in_columns = alike(row_sums[body, face], LAGS), alike(column_sums[body, face], LAGS)
+            in_rows, in_columns = (
+                alike(row_sums[body, face], LAGS),
+                alike(column_sums[body, face], LAGS),
+            )
             often = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
             slopes = view.plane_slopes[body, face]
             add_normal_equations(hessian, gradient, slopes, moment / often, force / often)

@@ -19,7 +19,7 @@ MM = 1000.0  # OpenCV's rectangles are found in millimetres, for the sake of sin
 
 
 def open3d_box(points: NDArray[np.float32]) -> UprightBox:
-    """Return open3d's smallest oriented bounding box, with the axis that is nearest to vertical as its z."""
+    """Return open3d's smallest oriented bounding box; its z is the axis nearest to vertical."""
     import open3d
 
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(np.float64)))
@@ -27,7 +27,7 @@ def open3d_box(points: NDArray[np.float32]) -> UprightBox:
     up = int(np.argmax(np.abs(box.R[2])))
     first, second = (axis for axis in range(3) if axis != up)
     yaw = float(np.arctan2(box.R[1, first], box.R[0, first]))
-    return UprightBox(np.asarray(box.center), np.asarray(box.extent)[[first, second, up]], yaw)
+    return UprightBox(np.array(box.center), np.array(box.extent)[[first, second, up]], yaw)
 
 
 def upright_rectangle(points: NDArray[np.float32]) -> UprightBox:

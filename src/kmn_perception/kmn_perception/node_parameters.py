@@ -20,6 +20,7 @@ from kmn_perception.segmentation import SegmentationSettings
 from kmn_perception.support_plane import SupportPlaneSettings
 
 RELIABILITIES = ("best_effort", "reliable")
+OBJECTS = ("nearest", "all")
 CAMERA_POSES = tuple(pose.value for pose in CameraPose)
 LENGTHS = {"camera_position": 3, "camera_quaternion": 4, "crop_min": 3, "crop_max": 3}
 
@@ -42,6 +43,10 @@ class NodeSettings:
         Frame of the parameters; clouds in it need no camera pose.
     reliability
         Of the subscriptions, ``best_effort`` or ``reliable``.
+    objects
+        Which ones are estimated, ``nearest`` or ``all``.
+    object_distance
+        By which an object's centre may move between two frames, metres.
     max_range
         Coordinates beyond it are not measurements, metres.
     estimator, pipeline
@@ -52,6 +57,8 @@ class NodeSettings:
     weights: str
     world_frame: str
     reliability: str
+    objects: str
+    object_distance: float
     max_range: float
     estimator: EstimatorSettings
     pipeline: PipelineSettings
@@ -71,6 +78,7 @@ class NodeSettings:
                     f"'{name}' must be {length} finite numbers, found {list(values[name])}"
                 )
         _check_choice("reliability", values["reliability"], RELIABILITIES)
+        _check_choice("objects", values["objects"], OBJECTS)
         _check_choice("camera_pose", values["camera_pose"], CAMERA_POSES)
         for name in ("model", "world_frame"):
             if not values[name]:
@@ -85,6 +93,8 @@ class NodeSettings:
             weights=values["weights"],
             world_frame=values["world_frame"],
             reliability=values["reliability"],
+            objects=values["objects"],
+            object_distance=values["object_distance"],
             max_range=values["max_range"],
             estimator=_pick(EstimatorSettings, values),
             pipeline=PipelineSettings(
@@ -160,6 +170,12 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "world_frame": _any("Frame of the parameters; clouds in this frame need no camera pose."),
     "reliability": _any(
         "Reliability of the subscriptions (REP-2003).", " or ".join(RELIABILITIES), read_only=True
+    ),
+    "objects": _any("Which objects of a frame are estimated.", " or ".join(OBJECTS)),
+    "object_distance": _real(
+        "Of all objects, one keeps its id while its centre moves less between two frames [m].",
+        0.0,
+        10.0,
     ),
     "camera_pose": _any(
         "Where the camera's optical frame is in the world.", " or ".join(CAMERA_POSES)

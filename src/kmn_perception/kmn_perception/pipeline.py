@@ -117,21 +117,34 @@ class MorphPipeline:
         in_world
             The points are in the world frame already.
         """
-        return self._estimate(points, in_world, 1)[0].estimate
+        return self.estimate_all(points, in_world, 1)[0].estimate
 
     def estimate_all(
-        self, points: NDArray[np.float32], in_world: bool = False
+        self, points: NDArray[np.float32], in_world: bool = False, most: int | None = None
     ) -> list[ObjectEstimate]:
-        """Estimate the morphing parameters of all objects among the points, the nearest first.
+        """Estimate the morphing parameters of ``most`` or all objects, the nearest first.
 
-        The parameters are those of `estimate`.
+        The other parameters are those of `estimate`.
 
         Returns
         -------
         objects
             One or more: where there is no object, a single one says why.
         """
-        return self._estimate(points, in_world, None)
+        model = self.estimator.model
+        try:
+            views, reason = self.observe(points, in_world, most), "no points of an object"
+        except NoCameraPoseError as error:
+            views, reason = [], str(error)
+        if not views:
+            nothing = np.zeros(points.shape[:-1], dtype=np.bool_)
+            none = Estimate.none(model, 0, Status.NO_OBJECT, reason)
+            empty = Observation(np.empty((0, 3), np.float32), model.camera)
+            return [ObjectEstimate(none, empty, nothing, False)]
+        estimates = self.estimator.estimate_all([view.observation for view in views])
+        return [
+            ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
+        ]
 
     def observe(
         self, points: NDArray[np.float32], in_world: bool = False, most: int | None = None
@@ -189,24 +202,6 @@ class MorphPipeline:
         if find_support_plane(points * UPSIDE_DOWN, settings) is not None:
             reason += ", but one does in the image turned by 180 deg: the camera is upside down"
         return reason
-
-    def _estimate(
-        self, points: NDArray[np.float32], in_world: bool, most: int | None
-    ) -> list[ObjectEstimate]:
-        model, reason = self.estimator.model, "no points of an object"
-        try:
-            views = self.observe(points, in_world, most)
-        except NoCameraPoseError as error:
-            views, reason = [], str(error)
-        if not views:
-            nothing = np.zeros(points.shape[:-1], dtype=np.bool_)
-            none = Estimate.none(model, 0, Status.NO_OBJECT, reason)
-            empty = Observation(np.empty((0, 3), np.float32), model.camera)
-            return [ObjectEstimate(none, empty, nothing, False)]
-        estimates = self.estimator.estimate_all([view.observation for view in views])
-        return [
-            ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
-        ]
 
     def _find_camera(
         self,

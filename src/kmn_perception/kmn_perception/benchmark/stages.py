@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
 from kmn_perception.messages import (
-    markers_from_estimate,
+    markers_from_estimates,
     parameters_from_estimate,
     points_from_cloud,
 )
@@ -46,7 +46,7 @@ def chain(
     def callback() -> None:
         estimate = pipeline.estimate(message_to_array())
         parameters_from_estimate(model, estimate, cloud.header)
-        markers_from_estimate(model, estimate, cloud.header)
+        markers_from_estimates(model, [estimate], cloud.header)
 
     points = message_to_array()
     views = pipeline.observe(points, most=1)

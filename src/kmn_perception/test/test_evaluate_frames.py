@@ -106,12 +106,11 @@ def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
 
 
 def _surface(box: UprightBox) -> NDArray[np.float32]:
-    """Return a grid of points on all faces of a box."""
-    line = np.linspace(-0.5, 0.5, 25)
-    u, v = (axis.ravel() for axis in np.meshgrid(line, line))
-    half = np.full_like(u, 0.5)
-    faces = [np.column_stack(c) for c in ((u, v, half), (u, half, v), (half, u, v))]
-    local = np.concatenate([*faces, *[-face for face in faces]])
+    """Draw points on all faces of a box."""
+    random = np.random.default_rng(0)
+    local, axis = random.uniform(-0.5, 0.5, size=(4000, 3)), random.integers(3, size=4000)
+    rows = np.arange(len(local))
+    local[rows, axis] = np.sign(local[rows, axis]) / 2.0
     cube = box.unit_cube
     return (local @ cube[:3, :3].T + cube[:3, 3]).astype(np.float32)
 

@@ -19,6 +19,8 @@ from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
+MOST = 0.9  # share of the points that must lie on the model, whatever else they show
+
 
 class Status(IntEnum):
     """What an estimate is worth; equal to the constants of kmn_msgs/MorphingParameters."""
@@ -44,6 +46,8 @@ class EstimatorSettings:
         Fewer points than this are not estimated.
     max_residual
         Largest median distance of the points to the predicted surface, metres.
+    max_deviation
+        Largest distance of nine tenths of the points to the predicted surface, metres.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
     refine
@@ -54,6 +58,7 @@ class EstimatorSettings:
     tolerance: float
     min_points: int
     max_residual: float
+    max_deviation: float
     limit_margin: float
     refine: bool
 
@@ -196,8 +201,9 @@ class MorphEstimator:
         else:
             doubt = self._doubt(change)
         theta, gamma = model.split(values)
-        residual = float(np.median(surface_distances(model.unit_cubes(theta, gamma), points)))
-        status, reason = self._judge(values, residual, doubt)
+        distances = surface_distances(model.unit_cubes(theta, gamma), points)
+        residual, deviation = np.quantile(distances, (0.5, MOST)).tolist()
+        status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(
             theta=theta,
             gamma=gamma,
@@ -221,7 +227,7 @@ class MorphEstimator:
         )
 
     def _judge(
-        self, values: NDArray[np.float64], residual: float, doubt: str
+        self, values: NDArray[np.float64], residual: float, deviation: float, doubt: str
     ) -> tuple[Status, str]:
         """Return the status of an estimate, and the reason if it is not OK."""
         settings = self.settings
@@ -235,5 +241,10 @@ class MorphEstimator:
             return Status.NOT_CONVERGED, (
                 f"the points lie {residual:.3f} m from the model, "
                 f"more than {settings.max_residual:g} m"
+            )
+        if not deviation <= settings.max_deviation:
+            return Status.NOT_CONVERGED, (
+                f"a tenth of the points lies more than {deviation:.3f} m from the model, "
+                f"{settings.max_deviation:g} m are allowed: it is of another shape"
             )
         return (Status.NOT_CONVERGED, doubt) if doubt else (Status.OK, "")

@@ -209,6 +209,9 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     ),
     "min_points": _whole("Objects of fewer points are not estimated.", 1, 1_000_000),
     "max_residual": _real("Largest median distance of the points to the model [m].", 0.0, 10.0),
+    "max_deviation": _real(
+        "Largest distance of nine tenths of the points to the model [m].", 0.0, 10.0
+    ),
     "limit_margin": _real(
         "Part of its range by which a parameter may exceed its limits.", 0.0, 1.0
     ),

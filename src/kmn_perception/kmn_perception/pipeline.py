@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from kmn_perception.intrinsics import camera_as_dense, camera_of_points
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, segment
+from kmn_perception.stacks import stands_on
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 from kmn_perception.surroundings import surroundings, touches_unseen
 
@@ -142,9 +144,10 @@ class MorphPipeline:
             empty = Observation(np.empty((0, 3), np.float32), model.camera)
             return [ObjectEstimate(none, empty, nothing, False)]
         estimates = self.estimator.estimate_all([view.observation for view in views])
-        return [
+        objects = [
             ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
         ]
+        return [self._unless_stacked(found, objects) for found in objects]
 
     def observe(
         self, points: NDArray[np.float32], in_world: bool = False, most: int | None = None
@@ -202,6 +205,27 @@ class MorphPipeline:
         if find_support_plane(points * UPSIDE_DOWN, settings) is not None:
             reason += ", but one does in the image turned by 180 deg: the camera is upside down"
         return reason
+
+    def _unless_stacked(
+        self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]
+    ) -> ObjectEstimate:
+        """Refuse the estimate of an object that stands on another one."""
+        points, cubes = found.observation.points, self._bodies(found)
+        for other in objects:
+            if other is not found and stands_on(points, cubes, self._bodies(other)):
+                reason = "the object stands on another one, not on the support plane"
+                status = Status.NOT_CONVERGED
+                return found._replace(
+                    estimate=replace(found.estimate, status=status, reason=reason, converged=False)
+                )
+        return found
+
+    def _bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
+        estimate = found.estimate
+        if estimate.status is not Status.OK:
+            return np.empty((0, 4, 4))
+        return self.estimator.model.unit_cubes(estimate.theta, estimate.gamma)
 
     def _find_camera(
         self,

@@ -180,21 +180,31 @@ def _sides(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return place and standard deviation of the sides (5,); NaN for those that are not seen.
 
-    First, faces end where a side is. A side that is seen, but too narrow for a face of its own,
-    then shows where the plane of the side behind ends.
+    A side is where its face is, and where the faces beside it end. One that faces the camera also
+    ends at the sides behind, whose places are known by then: this tells most of sides that are too
+    narrow for a face, or of which the sensor has rounded most off.
     """
-    offsets, deviations = faces.offsets.copy(), faces.deviations.copy()
+    offsets, deviations = np.full(5, np.nan), np.full(5, np.nan)
+    measured: list[list[Edge]] = [
+        [Edge(*face)] if np.isfinite(face[0]) else []
+        for face in zip(faces.offsets, faces.deviations, strict=True)
+    ]
     for side in range(5):
-        seen = _ends(side, faces.offsets, faces, outline, camera, settings)
-        if np.isfinite(offsets[side]):
-            seen.append(Edge(offsets[side], deviations[side]))
-        if seen:
-            offsets[side], deviations[side] = _combine(seen)
-    for side in np.flatnonzero(np.isnan(offsets)):
-        seen = _ends(int(side), offsets, faces, outline, camera, settings)
-        if seen:
-            offsets[side], deviations[side] = _combine(seen)
+        measured[side] += _ends(side, faces.offsets, faces, outline, camera, settings)
+        if measured[side]:
+            offsets[side], deviations[side] = _combine(measured[side])
+    behind = np.where(np.isnan(faces.offsets), offsets, np.nan)
+    for side in range(TOP):
+        seen = _ends(side, behind, faces, outline, camera, settings)
+        if seen and _faces_camera(side, seen[0].coordinate, faces, camera):
+            offsets[side], deviations[side] = _combine([*measured[side], *seen])
     return offsets, deviations
+
+
+def _faces_camera(side: int, offset: float, faces: Faces, camera: Camera) -> bool:
+    eye = camera.pose[:2, 3] - faces.origin
+    sign = 1.0 if side % 2 else -1.0
+    return bool(sign * (faces.axes[side // 2, :2] @ eye - offset) > 0.0)
 
 
 def _ends(

@@ -104,7 +104,8 @@ class MorphPipeline:
         find_support_plane(points, self.settings.plane)
         for cloud in (points, points.reshape(-1, 3)):
             segment(cloud, model.camera.pose, np.zeros(3), self.settings.background)
-        around = surroundings(points, np.eye(4), model.camera.pose, 0.0)
+        labels = np.zeros(points.shape[:-1], dtype=np.int32)
+        around = surroundings(points, labels, np.eye(4), model.camera.pose, 0.0)
         touches_unseen(np.isfinite(points[..., 2]), around.free_depth)
         self.estimator.warm_up()
 
@@ -164,13 +165,15 @@ class MorphPipeline:
         to_world = np.eye(4) if in_world else pose
         segments = segment(points, to_world, pose[:3, 3], background)
         floor = background.plane_margin if background.remove_plane else -np.inf
+        labels = segments.labels.reshape(points.shape[:-1])
         camera, around = self._find_camera(points, to_world, pose), None
         if camera is not None:
-            around = surroundings(points, camera.world_to_camera @ to_world, to_world, floor)
+            to_camera = camera.world_to_camera @ to_world
+            around = surroundings(points, labels, to_camera, to_world, floor)
         views = []
         for label in range(segments.objects)[:most]:
             seen = segments.of_object(label)
-            mask = (segments.labels == label).reshape(points.shape[:-1])
+            mask = labels == label
             sensor = camera or self._canonical_view(seen, pose)
             cut = around is not None and touches_unseen(mask, around.free_depth)
             views.append(ObjectView(Observation(seen, sensor, floor, around), mask, cut))

@@ -14,6 +14,7 @@ BORDER_RUN = 8  # pixels at the image's sides that a sensor may not measure at a
 
 def surroundings(
     points: NDArray[np.float32],
+    labels: NDArray[np.int32],
     to_camera: NDArray[np.float64],
     to_world: NDArray[np.float64],
     floor: float,
@@ -23,25 +24,29 @@ def surroundings(
     It is the depth of what is measured; infinite for the support, since no object is below it.
     Where nothing was measured, it is the larger one of those beside the gap in the same row: a
     sensor with a projector beside it does not measure in the shadow that something near throws on
-    something far, so that the gap may hide the far thing, but not the near one. A wide gap up to
-    the image's border shows nothing in range, of a narrow one nothing is known.
+    something far, so that the gap may hide the far thing, but not the near one. Of a gap within an
+    object nothing is known. A wide gap up to the image's border shows nothing in range, of a narrow
+    one nothing is known.
 
     Parameters
     ----------
     points
         (height, width, 3) metres, NaN for none.
+    labels
+        (height, width) number of the object that a pixel shows, negative for none.
     to_camera, to_world
         (4, 4) transformations of the points to the optical frame and to the world frame.
     floor
         World height in metres of what belongs to the support.
     """
-    free = _free_depth(points, to_camera[2].copy(), to_world[2].copy(), floor)
+    free = _free_depth(points, labels, to_camera[2].copy(), to_world[2].copy(), floor)
     return Surroundings(free, np.isnan(points[..., 2]))
 
 
 @njit(cache=True)
 def _free_depth(
     points: NDArray[np.float32],
+    labels: NDArray[np.int32],
     to_depth: NDArray[np.float64],
     to_height: NDArray[np.float64],
     floor: float,
@@ -49,16 +54,18 @@ def _free_depth(
     height, width, _ = points.shape
     free = np.empty((height, width), dtype=np.float32)
     for row in range(height):
-        last, left = -1, 0.0
+        last, left, left_label = -1, UNKNOWN, -1
         for column in range(width):
             depth = _along(to_depth, points[row, column])
             if not np.isfinite(depth):
                 continue
-            _fill(free[row], last + 1, column, left, depth)
+            label = labels[row, column]
+            within = label >= 0 and label == left_label
+            _fill(free[row], last + 1, column, left, depth, within)
             on_support = _along(to_height, points[row, column]) <= floor
             free[row, column] = EMPTY if on_support else depth
-            last, left = column, depth
-        _fill(free[row], last + 1, width, left, UNKNOWN)
+            last, left, left_label = column, depth, label
+        _fill(free[row], last + 1, width, left, UNKNOWN, False)
     return free
 
 
@@ -69,9 +76,13 @@ def _along(row: NDArray[np.float64], point: NDArray[np.float32]) -> float:
 
 
 @njit(cache=True)
-def _fill(free: NDArray[np.float32], start: int, stop: int, left: float, right: float) -> None:
+def _fill(
+    free: NDArray[np.float32], start: int, stop: int, left: float, right: float, within: bool
+) -> None:
     """Fill a gap between two depths, one of which is unknown at the image's border."""
-    if left != UNKNOWN and right != UNKNOWN:
+    if within:
+        free[start:stop] = UNKNOWN
+    elif left != UNKNOWN and right != UNKNOWN:
         free[start:stop] = max(left, right)
     else:
         free[start:stop] = EMPTY if stop - start > BORDER_RUN else UNKNOWN
@@ -79,14 +90,16 @@ def _fill(free: NDArray[np.float32], start: int, stop: int, left: float, right: 
 
 @njit(cache=True)
 def touches_unseen(mask: NDArray[np.bool_], free: NDArray[np.float32]) -> bool:
-    """Tell whether an object's pixels reach the image's border or pixels of which none is known."""
+    """Tell whether an object's pixels reach the image's border, or the unknown pixels there."""
     height, width = mask.shape
+    if mask[0].any() or mask[height - 1].any():
+        return True
     for row in range(height):
-        for column in range(width):
-            if not mask[row, column]:
-                continue
-            if row in (0, height - 1) or column in (0, width - 1):
-                return True
-            if free[row, column - 1] == UNKNOWN or free[row, column + 1] == UNKNOWN:
-                return True
+        first, last = 0, width - 1
+        while first < last and free[row, first] == UNKNOWN:
+            first += 1
+        while last > first and free[row, last] == UNKNOWN:
+            last -= 1
+        if mask[row, first] or mask[row, last]:
+            return True
     return False

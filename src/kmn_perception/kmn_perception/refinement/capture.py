@@ -84,7 +84,7 @@ def support(view: View, image: Image, body: int) -> float:
                     inverse, _ = meet(solids, other, u, v)
                     behind = max(behind, inverse)
             seen = float(inverse_depth[row, column])
-            if seen <= 0.0 and may_hide(seen, nearest, 0.0):
+            if seen <= 0.0 and may_hide(seen, image.presumed[row, column], nearest):
                 continue
             count += 1
             if 0.5 * (nearest + behind) < seen < 1.5 * nearest - 0.5 * behind:

@@ -12,6 +12,8 @@ from kmn_perception.observation import Observation, empty_surroundings
 from kmn_perception.refinement.view import projection
 
 HALF = 0.5
+THICKNESS = 0.02  # metres; other objects are at least as thick
+PRESUMED = 0.01  # metres by which presumed depths may be wrong
 LEAST_RANGE = 1e-6  # metres
 
 
@@ -74,17 +76,19 @@ def image_of(observation: Observation) -> Image:
 
 
 @njit(cache=True, error_model="numpy")
-def may_hide(seen: float, inverse_depth: float, margin: float) -> bool:
+def may_hide(seen: float, presumed: bool, inverse_depth: float) -> bool:
     """Tell whether something may be at an inverse depth, though the pixel does not show it.
+
+    It cannot be just behind what was measured, where the inside of another object is. What is
+    presumed may be the surface of the very object, but not behind it.
 
     Parameters
     ----------
-    seen
-        The pixel's value in `Image.inverse_depth`, not positive.
-    margin
-        Metres by which something must be before what was seen, so as not to be hidden by it.
+    seen, presumed
+        The pixel's values in `Image`; the former is not positive.
     """
-    return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen - margin
+    margin = -PRESUMED if presumed else THICKNESS
+    return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen + margin
 
 
 @njit(cache=True)

@@ -10,7 +10,6 @@ from kmn_perception.refinement.image import Image, may_hide
 from kmn_perception.refinement.view import View, meet_any
 
 MOST = 15  # times as many pixels as asked for are looked at in all
-MARGIN = 0.01  # metres; the model must be so much before what is seen instead of it
 DIGITS = 6  # of the share; less is the rounding of the points
 
 
@@ -62,7 +61,9 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
             seen = float(inverse_depth[row, column])
             if seen <= 0.0:
                 predicted = _predicted(solids, image, float(column), float(row))
-                unseen += predicted > 0.0 and not may_hide(seen, predicted, MARGIN)
+                unseen += predicted > 0.0 and not may_hide(
+                    seen, image.presumed[row, column], predicted
+                )
     return float(unseen * step**2)
 
 

@@ -97,6 +97,9 @@ def scan(
         if expected == 0.0:
             expected = at_edge
         seen = float(inverse_depth[row, column])
+        if seen <= 0.0 and may_hide(seen, presumed[row, column], expected):
+            evidence[k] = 0.0
+            continue
         evidence[k] = _evidence(
             solids, settings, depth_noise, b, float(column), float(row), seen, expected
         )
@@ -126,7 +129,7 @@ def _evidence(
                 return 0.0
             behind = max(behind, met)
     if seen <= 0.0:
-        return 0.0 if may_hide(seen, expected, settings.contrast) else -certain
+        return -certain
     depth = 1.0 / seen - 1.0 / expected
     if depth < -settings.occluder and seen > expected + CERTAIN * depth_noise:
         return 0.0

@@ -115,7 +115,8 @@ def points_from_depth(image: Image, info: CameraInfo, max_range: float) -> NDArr
         raise MessageError(
             "size_mismatch",
             f"the depth image has {image.width} x {image.height} pixels, "
-            f"its camera_info {info.width} x {info.height}; expected the same size",
+            f"its camera_info {info.width} x {info.height}; expected the same size: "
+            "the camera_info is of another resolution or of another camera",
         )
     return depth_to_points(depth, camera)
 
@@ -139,6 +140,12 @@ def depth_from_image(image: Image, max_range: float) -> NDArray[np.float32]:
     depth = raw.astype(np.float32)
     if dtype.kind == "u":
         depth /= np.float32(MM_PER_M)
+    if np.count_nonzero(depth < 0.0) > depth.size / 2:
+        raise MessageError(
+            "flipped_z",
+            "most of the depth image is negative: z is flipped; expected depth along the optical "
+            "axis, forward",
+        )
     depth[~(depth > 0.0)] = np.nan
     depth[~_measured(depth, max_range)] = np.nan
     return depth
@@ -347,7 +354,7 @@ def _measured(reach: NDArray[np.float32], max_range: float) -> NDArray[np.bool_]
             raise MessageError(
                 "huge_values",
                 f"no point lies within {max_range:g} m, the nearest at {np.nanmin(reach):g} m; "
-                "expected metres",
+                "expected metres; if these are millimetres, divide by 1000",
             )
         raise MessageError("no_finite_points", f"none of the {reach.size} points was measured")
     return measured

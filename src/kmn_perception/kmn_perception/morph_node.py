@@ -38,6 +38,7 @@ from kmn_perception.messages import (
 )
 from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
 from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.sensor_watch import SensorWatch
 from kmn_perception.tracking import ObjectTracker
 
 DIAGNOSTICS_PERIOD = 1.0  # seconds
@@ -49,12 +50,13 @@ class Frame(NamedTuple):
     """A message that waits for its estimation.
 
     ``read`` returns its points, given the maximal range, or raises `MessageError`; ``received``
-    is in seconds of the monotonic clock.
+    is in seconds of the monotonic clock; ``info`` is the description of a depth image.
     """
 
     header: Header
     read: Callable[[float], NDArray[np.float32]]
     received: float
+    info: CameraInfo | None = None
 
 
 class Found(NamedTuple):
@@ -111,6 +113,7 @@ class MorphNode(Node):
         settings = NodeSettings.check(read_parameters(self))
         self._active = Active(settings, _load(settings))
         self._statistics = FrameStatistics()
+        self._sensor = SensorWatch(DIAGNOSTICS_PERIOD)
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._tracker = ObjectTracker(settings.object_distance)
         self._camera_info: CameraInfo | None = None
@@ -176,11 +179,15 @@ class MorphNode(Node):
         self._statistics.lose(max(0, number - self._sequence.get(topic, number) - 1))
         self._sequence[topic] = number
 
-    def _submit_image(self, image: Image, camera_info: CameraInfo) -> None:
-        self._submit("depth/image", image.header, partial(points_from_depth, image, camera_info))
+    def _submit_image(self, image: Image, info: CameraInfo) -> None:
+        self._submit("depth/image", image.header, partial(points_from_depth, image, info), info)
 
     def _submit(
-        self, source: str, header: Header, read: Callable[[float], NDArray[np.float32]]
+        self,
+        source: str,
+        header: Header,
+        read: Callable[[float], NDArray[np.float32]],
+        info: CameraInfo | None = None,
     ) -> None:
         """Hand the newest frame to the estimation thread."""
         stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
@@ -193,7 +200,7 @@ class MorphNode(Node):
             self._warn(
                 "clock_jump", f"stamps went back from {last_stamp / 1e9} s to {stamp / 1e9} s"
             )
-        replaced = self._mailbox.put(Frame(header, read, time.monotonic()))
+        replaced = self._mailbox.put(Frame(header, read, time.monotonic(), info))
         self._statistics.receive(replaced)
 
     def _on_estimate(
@@ -222,6 +229,9 @@ class MorphNode(Node):
         try:
             points = frame.read(settings.max_range)
             in_world = frame.header.frame_id == settings.world_frame
+            if not in_world:
+                for mistake in self._sensor.look(points, frame.header.frame_id, frame.info):
+                    self._warn(mistake.key, mistake.text)
             objects = pipeline.estimate_all(points, in_world, None if all_objects else 1)
         except MessageError as error:
             self._refuse(error.reason, str(error))
@@ -262,8 +272,9 @@ class MorphNode(Node):
             self.get_logger().warning(text)
 
     def _report(self) -> None:
-        name = f"{self.get_fully_qualified_name()}: frames"
-        report = DiagnosticArray(status=[self._statistics.report(name, DIAGNOSTICS_PERIOD)])
+        name = self.get_fully_qualified_name()
+        frames = self._statistics.report(f"{name}: frames", DIAGNOSTICS_PERIOD)
+        report = DiagnosticArray(status=[frames, self._sensor.report(f"{name}: sensor")])
         report.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_publisher.publish(report)
 

@@ -125,4 +125,4 @@ def test_frames_that_differ_are_told(points: NDArray[np.float32]) -> None:
 
 
 def test_a_cloud_in_the_frame_of_another_camera_is_recognised(points: NDArray[np.float32]) -> None:
-    assert _keys(points + np.float32([0.025, 0.0, 0.0])) == ["other_origin"]
+    assert _keys(points + np.array([0.025, 0.0, 0.0], dtype=np.float32)) == ["other_origin"]

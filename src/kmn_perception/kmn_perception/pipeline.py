@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.fragments import find_parted
 from kmn_perception.intrinsics import camera_as_dense, camera_of_points
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
@@ -21,6 +22,10 @@ from kmn_perception.support_plane import SupportPlaneSettings, find_support_plan
 from kmn_perception.surroundings import surroundings, touches_unseen
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
+
+LEAST_TO_PART = 3  # two parts and what is in front of them
+SAME_HEIGHT = 0.015  # metres by which the tops of an object's parts may differ
+TOP = 0.99  # quantile of the points' heights
 
 
 class CameraPose(str, Enum):
@@ -144,6 +149,7 @@ class MorphPipeline:
             none = Estimate.none(model, 0, Status.NO_OBJECT, reason)
             empty = Observation(np.empty((0, 3), np.float32), model.camera)
             return [ObjectEstimate(none, empty, nothing, False)]
+        views = self._rejoined(views)
         estimates = self.estimator.estimate_all([view.observation for view in views])
         objects = [
             ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
@@ -208,6 +214,31 @@ class MorphPipeline:
         if find_support_plane(points * UPSIDE_DOWN, settings) is not None:
             reason += ", but one does in the image turned by 180 deg: the camera is upside down"
         return reason
+
+    def _rejoined(self, views: list[ObjectView]) -> list[ObjectView]:
+        """Join what something in front parts in the image, if one model explains both parts."""
+        around = views[0].observation.surroundings
+        if around is None or len(views) < LEAST_TO_PART:
+            return views
+        owner = list(range(len(views)))  # the first of the parts to which a view belongs
+        for a, b in find_parted([view.mask for view in views], around.free_depth):
+            first, second = sorted((owner[a], owner[b]))
+            joined = None if first == second else self._joined(views[first], views[second])
+            if joined is not None:
+                views = [joined if i == first else view for i, view in enumerate(views)]
+                owner = [first if i == second else i for i in owner]
+        return [view for i, view in enumerate(views) if owner[i] == i]
+
+    def _joined(self, a: ObjectView, b: ObjectView) -> ObjectView | None:
+        """Return two views as one, if their tops are level and one model explains them."""
+        parts = (a.observation.points, b.observation.points)
+        heights = [np.quantile(points[:, 2], TOP) for points in parts]
+        if abs(heights[0] - heights[1]) > SAME_HEIGHT:
+            return None
+        observation = replace(a.observation, points=np.concatenate(parts))
+        if self.estimator.estimate(observation).status is not Status.OK:
+            return None
+        return ObjectView(observation, a.mask | b.mask, a.cut or b.cut)
 
     def _unless_stacked(
         self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]

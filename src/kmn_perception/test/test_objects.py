@@ -118,6 +118,30 @@ def test_a_box_behind_another_is_open_where_it_is_hidden() -> None:
     assert sides[2] == pytest.approx(0.25, abs=0.005)
 
 
+PILLAR = (0.0, -0.12, 0.16, 0.06, 0.06, 0.32, 0.0)  # hides a strip from the table to the top
+
+
+def test_an_object_that_another_one_parts_in_the_image_is_one() -> None:
+    behind = (0.01, 0.05, 0.06, 0.34, 0.12, 0.12, 0.1)
+    found = see(PILLAR, behind)
+    assert len(found) == 2
+    for one, box in zip(found, (PILLAR, behind), strict=True):
+        assert_is(one, box)
+    columns = np.flatnonzero(found[1].mask.any(axis=0))
+    assert (np.diff(columns) > 10).any()  # its pixels are on both sides
+
+
+@pytest.mark.parametrize(
+    "other", [(0.1, 0.05, 0.09, 0.12, 0.1, 0.18, 0.0), (0.1, 0.05, 0.06, 0.12, 0.1, 0.12, 0.5)]
+)
+def test_two_objects_behind_another_one_stay_two(other: Box) -> None:
+    first = (-0.1, 0.05, 0.06, 0.12, 0.1, 0.12, 0.0)
+    found = see(PILLAR, first, other)
+    assert len(found) == 3
+    areas = [np.flatnonzero(one.mask.any(axis=0)) for one in found]
+    assert all((np.diff(columns) == 1).all() for columns in areas)
+
+
 @pytest.mark.parametrize(
     "box", [(0.5, 0.0, 0.075, 0.3, 0.1, 0.15, 0.3), (0.0, -0.45, 0.05, 0.2, 0.3, 0.1, 0.3)]
 )

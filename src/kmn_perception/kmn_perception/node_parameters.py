@@ -195,7 +195,7 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "crop_max": _any("Upper corner of the crop volume, world frame [m].", "3 numbers"),
     "remove_plane": _any("Remove the support plane z = 0 and what lies below it."),
     "plane_margin": _real("Height above z = 0 that belongs to the support plane [m].", 0.0, 0.5),
-    "cluster": _any("Keep only the nearest large cluster."),
+    "cluster": _any("Part the points into clusters; large ones are objects."),
     "cluster_step": _real("Larger steps between neighbours part clusters [m].", 0.001, 1.0),
     "cluster_min_points": _whole("Smaller clusters are not objects.", 1, 1_000_000),
     "cluster_crease": _real(

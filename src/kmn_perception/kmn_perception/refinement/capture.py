@@ -65,7 +65,7 @@ def support(view: View, image: Image, body: int) -> float:
     A pixel shows the body when its depth is nearer to the body's than to that of what the model has
     behind it. A body that is out of view has full support.
     """
-    solids, inverse_depth = view.solids, image.inverse_depth
+    solids, inverse_depth, presumed = view.solids, image.inverse_depth, image.presumed
     height, width = inverse_depth.shape
     first = max(0, int(np.ceil(max(solids[body, 0], 0.0))))
     last = min(width - 1, int(np.floor(min(solids[body, 1], width - 1.0))))
@@ -84,7 +84,7 @@ def support(view: View, image: Image, body: int) -> float:
                     inverse, _ = meet(solids, other, u, v)
                     behind = max(behind, inverse)
             seen = float(inverse_depth[row, column])
-            if seen <= 0.0 and may_hide(seen, image.presumed[row, column], nearest):
+            if seen <= 0.0 and may_hide(seen, presumed[row, column], nearest):
                 continue
             count += 1
             if 0.5 * (nearest + behind) < seen < 1.5 * nearest - 0.5 * behind:

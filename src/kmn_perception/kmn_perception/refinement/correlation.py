@@ -16,9 +16,15 @@ def alike(sums: NDArray[np.float64], lags: int) -> float:
     sums
         (K,) sum of the residuals of each row.
     lags
-        So many neighbouring rows may be shifted alike, too (Newey and West).
+        So many neighbouring rows may be shifted alike, too. Their covariances are weighted as by
+        Newey and West, which the mean square of the sums of all runs of ``lags`` rows amounts to.
     """
-    variance = alone = (sums**2).sum()
-    for lag in range(1, lags):
-        variance += 2.0 * (1.0 - lag / lags) * (sums[lag:] * sums[:-lag]).sum()
-    return float(max(alone, variance))
+    alone, variance, window = 0.0, 0.0, 0.0
+    for i in range(sums.shape[0] + lags - 1):
+        if i < sums.shape[0]:
+            alone += sums[i] ** 2
+            window += sums[i]
+        if i >= lags:
+            window -= sums[i - lags]
+        variance += window**2
+    return float(max(alone, variance / lags))

@@ -116,7 +116,7 @@ def _add_edge(
 ) -> bool:
     """Add the samples of an edge, one in each row (or column); tell whether it is in view."""
     solids, lines, all_ends, faces = view.solids, view.lines[b], view.ends[b], view.faces[b]
-    inverse_depth, upwards = image.inverse_depth, image.upwards
+    inverse_depth, presumed, upwards = image.inverse_depth, image.presumed, image.upwards
     lowest = image.floor + settings.floor_margin
     evidence = np.empty(4 * LARGEST_WINDOW)
     line, ends = lines[edge], all_ends[edge]
@@ -140,7 +140,7 @@ def _add_edge(
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(
-            solids, inverse_depth, image.presumed, settings, depth_noise, b, line[1 - along],
+            solids, inverse_depth, presumed, settings, depth_noise, b, line[1 - along],
             at_edge, rows, a, position, window, chord, evidence,
         )  # fmt: skip
         if count == 0:

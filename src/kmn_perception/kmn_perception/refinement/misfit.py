@@ -47,7 +47,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 @njit(cache=True, error_model="numpy")
 def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
     """Return the number of pixels that were seen to be empty, though the model is there."""
-    inverse_depth = image.inverse_depth
+    inverse_depth, presumed = image.inverse_depth, image.presumed
     height, width = inverse_depth.shape
     left, right = max(solids[:, 0].min(), 0.0), min(solids[:, 1].max(), width - 1.0)
     top, bottom = max(solids[:, 2].min(), 0.0), min(solids[:, 3].max(), height - 1.0)
@@ -61,9 +61,7 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
             seen = float(inverse_depth[row, column])
             if seen <= 0.0:
                 predicted = _predicted(solids, image, float(column), float(row))
-                unseen += predicted > 0.0 and not may_hide(
-                    seen, image.presumed[row, column], predicted
-                )
+                unseen += predicted > 0.0 and not may_hide(seen, presumed[row, column], predicted)
     return float(unseen * step**2)
 
 

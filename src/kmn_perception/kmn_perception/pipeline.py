@@ -22,7 +22,6 @@ from kmn_perception.support_plane import SupportPlaneSettings, find_support_plan
 from kmn_perception.surroundings import surroundings, touches_unseen
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
-
 LEAST_TO_PART = 3  # two parts and what is in front of them
 SAME_HEIGHT = 0.015  # metres by which the tops of an object's parts may differ
 TOP = 0.99  # quantile of the points' heights
@@ -161,6 +160,8 @@ class MorphPipeline:
     ) -> list[ObjectView]:
         """Return what is seen of the objects, ``most`` or all of them, the nearest first.
 
+        Those that are too small to be estimated come last.
+
         Raises
         ------
         NoCameraPoseError
@@ -177,7 +178,9 @@ class MorphPipeline:
             to_camera = camera.world_to_camera @ to_world
             around = surroundings(points, labels, to_camera, to_world, floor)
         views = []
-        for label in range(segments.objects)[:most]:
+        sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
+        too_small = sizes < self.estimator.settings.min_points
+        for label in np.argsort(too_small, kind="stable")[:most]:
             seen = segments.of_object(label)
             mask = labels == label
             sensor = camera or self._canonical_view(seen, pose)

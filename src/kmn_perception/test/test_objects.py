@@ -118,6 +118,14 @@ def test_a_box_behind_another_is_open_where_it_is_hidden() -> None:
     assert sides[2] == pytest.approx(0.25, abs=0.005)
 
 
+def test_a_small_object_is_told_after_the_others_but_not_estimated() -> None:
+    box = (0.0, 0.1, 0.1, 0.25, 0.1, 0.2, 0.3)
+    found = see(box, (0.1, -0.2, 0.0125, 0.02, 0.02, 0.025, 0.0))
+    assert_is(found[0], box)
+    assert [one.estimate.status for one in found[1:]] == [Status.TOO_FEW_POINTS]
+    assert "at least 300 are needed" in found[1].estimate.reason
+
+
 PILLAR = (0.0, -0.12, 0.16, 0.06, 0.06, 0.32, 0.0)  # hides a strip from the table to the top
 
 

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from kmn_perception.command_line import output_file
 from kmn_perception.frames.experiment import FrameResult, load_pipeline, run
-from kmn_perception.frames.figures import figures, method_table, object_table
+from kmn_perception.frames.figures import details, figures, method_table, object_table
 from kmn_perception.frames.labelled_frame import FramesError, read_frames
 from kmn_perception.frames.pictures import draw
 from kmn_perception.frames.settings import FramesSettings
@@ -51,7 +51,7 @@ def main() -> int:
         return 1
     summary = figures(results, settings)
     print(object_table(results), method_table(summary), sep="\n\n")
-    print(json.dumps({k: v for k, v in summary.items() if k != "baselines"}))
+    print("", details(summary), sep="\n")
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         overlays = draw(results, pipeline.estimator.model, settings)

@@ -40,6 +40,7 @@ def figures(results: Sequence[FrameResult], settings: FramesSettings) -> Figures
             )
             for name in results[0].baselines
         },
+        "size_error_by_side_m": _by_side(scores, settings),
         "gross": sum(s.gross for s in scores),
         "less_visible": {
             "objects": len(hidden),
@@ -83,6 +84,18 @@ def _of_method(scores: Sequence[Score], false_found: int, settings: FramesSettin
     if stated:
         result["coverage95"] = _round(float(np.mean(stated)), 4)
     return result
+
+
+def _by_side(scores: Sequence[Score], settings: FramesSettings) -> Figures:
+    """Return the median size errors of the longer and the shorter level side, and of the height."""
+    errors: dict[str, list[float]] = {"long": [], "short": [], "height": []}
+    for s in scores:
+        if s.detection is not None and _counts(s, settings):
+            size, seen = s.reference.box.size, s.reference.sizes_in_view
+            long = int(size[1] > size[0])
+            for name, axis in zip(errors, (long, 1 - long, 2), strict=True):
+                errors[name] += [float(s.errors.size[axis])] if seen[axis] else []
+    return {name: {"median": _quantile(values, 50)} for name, values in errors.items()}
 
 
 def _reference_deviation(scores: Sequence[Score], settings: FramesSettings) -> Figures:
@@ -155,3 +168,23 @@ def method_table(result: Figures) -> str:
 
 def _text(value: float | None, scale: float, digits: int) -> str:
     return NONE if value is None else f"{scale * value:.{digits}f}"
+
+
+def details(result: Figures) -> str:
+    """Return in words what the table does not hold."""
+    by_side, steps = result["size_error_by_side_m"], result["predictions"]
+    sides = ", ".join(f"{name} {_text(e['median'], 1e3, 1)}" for name, e in by_side.items())
+    own, hidden = result["reference_deviation"], result["less_visible"]
+    times = result["milliseconds"]
+    return "\n".join(
+        [
+            f"Size errors by side [mm]: {sides}",
+            f"Objects of which less is visible: {hidden['found']} of {hidden['objects']} found",
+            f"Sides stated as well known and wrong by far: {result['gross']}",
+            f"Milliseconds a frame: {times['median']:.0f} median, {times['max']:.0f} at most",
+            f"Predictions until one changes little: {_text(steps['real'], 1.0, 1)}, "
+            f"in simulation {_text(steps['simulated'], 1.0, 1)}",
+            f"Standard deviations of the references: yaw {_text(own['yaw_deg']['median'], 1.0, 2)} "
+            f"deg, a side {_text(own['side_m']['median'], 1e3, 1)} mm",
+        ]
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,8 @@ import torch
 import yaml
 from numpy.typing import NDArray
 
-from kmn_perception import resources
-from kmn_perception.estimator import MorphEstimator, Status
+from kmn_perception import resources, weights
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
 from kmn_perception.frames.baselines import BASELINES
 from kmn_perception.frames.labelled_frame import LabelledFrame
 from kmn_perception.frames.reference import References, measure
@@ -20,6 +21,7 @@ from kmn_perception.frames.scores import Detection, Score, score
 from kmn_perception.frames.settings import FramesSettings
 from kmn_perception.frames.upright_box import UprightBox, box_of_cube
 from kmn_perception.morph import predictions
+from kmn_perception.network import MorphNetwork
 from kmn_perception.node_parameters import NodeSettings
 from kmn_perception.observation import Observation
 from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError, ObjectEstimate
@@ -45,8 +47,9 @@ class FrameResult(NamedTuple):
     seconds
         That the pipeline took for the whole frame.
     predictions, simulated_predictions
-        Steps of Algorithm 1 until the first that changes little, of each object that was found,
-        and of its reference as rendered alone with the noise of a Kinect.
+        Steps of the paper's network, which repeats one prediction, until the first that changes
+        little: of each object that was found, and of its reference as rendered alone with the noise
+        of a Kinect.
     """
 
     frame: LabelledFrame
@@ -80,15 +83,18 @@ def run(
     frames: Sequence[LabelledFrame], pipeline: MorphPipeline, settings: FramesSettings
 ) -> Iterator[FrameResult]:
     """Yield the result of each frame."""
+    model = pipeline.estimator.model
+    paper = weights.load(f"paper/{model.name}", model).network
     for _ in range(2):  # what was not compiled yet is not measured
         pipeline.estimate_all(depth_to_points(frames[0].depth, settings.camera))
     for number, frame in enumerate(frames):
-        yield _run(frame, pipeline, settings, np.random.default_rng(number))
+        yield _run(frame, pipeline, paper, settings, np.random.default_rng(number))
 
 
 def _run(
     frame: LabelledFrame,
     pipeline: MorphPipeline,
+    paper: MorphNetwork,
     settings: FramesSettings,
     generator: np.random.Generator,
 ) -> FrameResult:
@@ -111,6 +117,7 @@ def _run(
         name: score(frame.name, references, pose, boxes, model, settings)
         for name, boxes in detections.items()
     }
+    count = partial(_count_predictions, paper, pipeline.estimator.settings)
     false_found = {
         name: len(boxes) - sum(s.detection is not None for s in scores[name])
         for name, boxes in detections.items()
@@ -130,8 +137,8 @@ def _run(
         baselines=scores,
         false_found=false_found,
         seconds=seconds,
-        predictions=_count_predictions([objects[i].observation for i in found], pipeline),
-        simulated_predictions=_count_predictions(simulated, pipeline),
+        predictions=count([objects[i].observation for i in found]),
+        simulated_predictions=count(simulated),
     )
 
 
@@ -150,13 +157,14 @@ def _observe_alone(
     return Observation(depth_to_cloud(depth, references.camera), references.camera)
 
 
-def _count_predictions(observations: Sequence[Observation], pipeline: MorphPipeline) -> list[int]:
+def _count_predictions(
+    network: MorphNetwork, settings: EstimatorSettings, observations: Sequence[Observation]
+) -> list[int]:
     """Return, for each object, how many predictions it takes until one changes little."""
     if not observations:
         return []
-    settings = pipeline.estimator.settings
     changes = []
-    for prediction in predictions(pipeline.estimator.network, observations):
+    for prediction in predictions(network, observations):
         changes.append(prediction.change)
         if len(changes) >= settings.iterations:
             break

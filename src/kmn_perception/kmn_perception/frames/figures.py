@@ -182,8 +182,8 @@ def details(result: Figures) -> str:
             f"Objects of which less is visible: {hidden['found']} of {hidden['objects']} found",
             f"Sides stated as well known and wrong by far: {result['gross']}",
             f"Milliseconds a frame: {times['median']:.0f} median, {times['max']:.0f} at most",
-            f"Predictions until one changes little: {_text(steps['real'], 1.0, 1)}, "
-            f"in simulation {_text(steps['simulated'], 1.0, 1)}",
+            "Predictions of the paper's network until one changes little: "
+            f"{_text(steps['real'], 1.0, 1)}, in simulation {_text(steps['simulated'], 1.0, 1)}",
             f"Standard deviations of the references: yaw {_text(own['yaw_deg']['median'], 1.0, 2)} "
             f"deg, a side {_text(own['side_m']['median'], 1e3, 1)} mm",
         ]

@@ -106,11 +106,15 @@ class MorphPipeline:
         prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
         points = depth_to_points(render(prototype, model.camera), model.camera)
         find_support_plane(points, self.settings.plane)
+        # At any angle that is not 0 the surface's rounding errors have creases.
+        creased = replace(self.settings.background, cluster=True, cluster_crease=1e-9)
         for cloud in (points, points.reshape(-1, 3)):
-            segment(cloud, model.camera.pose, np.zeros(3), self.settings.background)
+            segment(cloud, model.camera.pose, np.zeros(3), creased)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
         around = surroundings(points, labels, np.eye(4), model.camera.pose, 0.0)
-        touches_unseen(np.isfinite(points[..., 2]), around.free_depth)
+        mask = np.isfinite(points[..., 2])
+        touches_unseen(mask, around.free_depth)
+        find_parted([mask], around.free_depth)
         self.estimator.warm_up()
 
     def estimate(self, points: NDArray[np.float32], in_world: bool = False) -> Estimate:

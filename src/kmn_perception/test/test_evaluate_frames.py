@@ -96,7 +96,7 @@ def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None
     with pytest.raises(FramesError, match="labels of 320 x 240 pixels for a depth image of 640"):
         read_frames(tmp_path)
     cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint8))
-    with pytest.raises(FramesError, match="no pixel is labelled 1, expected a table"):
+    with pytest.raises(FramesError, match="0 measured pixels are labelled 1, expected a table"):
         read_frames(tmp_path)
 
 

@@ -93,6 +93,15 @@ def test_a_side_beyond_the_image_is_not_in_view() -> None:
     np.testing.assert_array_equal(cut.in_view, [True, False, True, True, True])
 
 
+@pytest.mark.parametrize("pixels", [1, 50, 400])
+def test_an_object_of_which_no_upright_face_is_seen_is_not_measured(pixels: int) -> None:
+    scene = _scene([_box(0.0, 0.1, 20.0, [0.25, 0.16, 0.08])], "kinect")
+    rows, columns = np.nonzero(scene.labels == 20)
+    few = scene.labels.copy()
+    few[rows[pixels:], columns[pixels:]] = 0  # of the far part of the top alone
+    assert not measure(replace(scene, labels=few), _settings(), CAMERA.pose).boxes
+
+
 def test_half_of_an_object_behind_another_is_seen_as_half() -> None:
     near, far = _box(0.0, 0.0, 0.0, [0.12, 0.05, 0.2]), _box(0.0, 0.08, 0.0, [0.25, 0.06, 0.2])
     scene = _scene([far, near], "none")

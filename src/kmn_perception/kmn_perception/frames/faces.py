@@ -110,8 +110,10 @@ def fit_faces(
     for _ in range(settings.steps):
         belongs = _assign(p, n, sigma, faces, settings)
         belongs = _away_from_corners(p, belongs, faces, settings)
+        if not ((belongs != NOWHERE) & (belongs != TOP)).any():
+            return None
         faces = _step(p, sigma, blocks, belongs, faces, settings)
-    return None if np.isnan(faces.offsets[:TOP]).all() else faces
+    return faces
 
 
 def _assign(

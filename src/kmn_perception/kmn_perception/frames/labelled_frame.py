@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 DEPTH_SUFFIX, LABEL_SUFFIX = "_d.png", "_l.png"
 MM_PER_M = 1000.0
 TABLE, FIRST_OBJECT = 1, 2  # labels; 0 is the rest
+LEAST_TABLE = 100  # pixels
 
 
 class FramesError(ValueError):
@@ -71,8 +72,12 @@ def _read_frame(file: Path) -> LabelledFrame:
             f"{name}: labels of {labels.shape[1]} x {labels.shape[0]} pixels for a depth image of "
             f"{millimetres.shape[1]} x {millimetres.shape[0]}; expected the same size"
         )
-    if not (labels == TABLE).any():
-        raise FramesError(f"{name}: no pixel is labelled {TABLE}, expected a table")
+    table = (labels == TABLE) & (millimetres > 0)
+    if table.sum() < LEAST_TABLE:
+        raise FramesError(
+            f"{name}: {table.sum()} measured pixels are labelled {TABLE}, expected a table of "
+            f"{LEAST_TABLE} or more"
+        )
     depth = (millimetres / MM_PER_M).astype(np.float32)
     depth[millimetres == 0] = np.nan
     return LabelledFrame(name, depth, labels)

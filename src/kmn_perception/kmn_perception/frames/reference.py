@@ -111,7 +111,7 @@ class References(NamedTuple):
 def measure(
     frame: LabelledFrame, settings: FramesSettings, heading: NDArray[np.float64]
 ) -> References:
-    """Measure every labelled carton of a frame.
+    """Measure every labelled carton of a frame of which an upright face is seen.
 
     The table is z = 0 and gives gravity. The faces in view give yaw and planes, at right angles.
     Where the face beyond is not in view, a side is where the faces beside it end in the image.
@@ -132,7 +132,8 @@ def measure(
         faces = fit_faces(world, frame.depth.astype(np.float64), mask, settings.faces)
         if faces is not None:
             outline = find_outline(mask, frame.depth, camera, settings.outline)
-            boxes.append(_reference(label, world[mask], mask, faces, outline, camera, settings))
+            box = _reference(label, world[mask], mask, faces, outline, camera, settings)
+            boxes += [] if box is None else [box]
     return References(camera, boxes)
 
 
@@ -159,7 +160,8 @@ def _reference(
     outline: Outline,
     camera: Camera,
     settings: FramesSettings,
-) -> Reference:
+) -> Reference | None:
+    """Return what the faces and the outline tell of an object; None if that is no box."""
     offsets, deviations = _sides(faces, outline, camera, settings.outline)
     axes = faces.axes
     ends = (points - [*faces.origin, 0.0]) @ axes.T
@@ -168,6 +170,8 @@ def _reference(
         offsets[side], deviations[side] = extreme(ends[:, side // 2]), np.inf
     low, high = np.array([offsets[0], offsets[2], 0.0]), np.array([*offsets[[1, 3]], offsets[TOP]])
     centre = (low + high) / 2.0 @ axes + [*faces.origin, 0.0]
+    if (high <= low).any():
+        return None
     box = UprightBox(centre, high - low, faces.yaw)
     silhouette = np.isfinite(render(box.unit_cube[None], camera))
     share = float((mask & silhouette).sum() / max(silhouette.sum(), 1))

@@ -19,7 +19,7 @@ from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, segment
 from kmn_perception.stacks import stands_on
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
-from kmn_perception.surroundings import surroundings, touches_unseen
+from kmn_perception.surroundings import surroundings, surroundings_of_cloud, touches_unseen
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
 LEAST_TO_PART = 3  # two parts and what is in front of them
@@ -177,7 +177,7 @@ class MorphPipeline:
         segments = segment(points, to_world, pose[:3, 3], background)
         floor = background.plane_margin if background.remove_plane else -np.inf
         labels = segments.labels.reshape(points.shape[:-1])
-        camera, around = self._find_camera(points, to_world, pose), None
+        camera = self._find_camera(points, to_world, pose)
         if camera is not None:
             to_camera = camera.world_to_camera @ to_world
             around = surroundings(points, labels, to_camera, to_world, floor)
@@ -185,11 +185,14 @@ class MorphPipeline:
         sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
         too_small = sizes < self.estimator.settings.min_points
         for label in np.argsort(too_small, kind="stable")[:most]:
-            seen = segments.of_object(label)
-            mask = labels == label
-            sensor = camera or self._canonical_view(seen, pose)
-            cut = around is not None and touches_unseen(mask, around.free_depth)
-            views.append(ObjectView(Observation(seen, sensor, floor, around), mask, cut))
+            seen, mask = segments.of_object(label), labels == label
+            if camera is not None:
+                cut = touches_unseen(mask, around.free_depth)
+                views.append(ObjectView(Observation(seen, camera, floor, around), mask, cut))
+            else:
+                sensor = self._canonical_view(seen, pose)
+                beside = surroundings_of_cloud(segments.points, sensor, floor)
+                views.append(ObjectView(Observation(seen, sensor, floor, beside), mask, False))
         return views
 
     def camera_pose(
@@ -224,9 +227,9 @@ class MorphPipeline:
 
     def _rejoined(self, views: list[ObjectView]) -> list[ObjectView]:
         """Join what something in front parts in the image, if one model explains both parts."""
-        around = views[0].observation.surroundings
-        if around is None or len(views) < LEAST_TO_PART:
-            return views
+        around, mask = views[0].observation.surroundings, views[0].mask
+        if around is None or mask.shape != around.free_depth.shape or len(views) < LEAST_TO_PART:
+            return views  # unorganised points have no image in which anything could part them
         owner = list(range(len(views)))  # the first of the parts to which a view belongs
         for a, b in find_parted([view.mask for view in views], around.free_depth):
             first, second = sorted((owner[a], owner[b]))

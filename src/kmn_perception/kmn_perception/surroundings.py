@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.observation import Surroundings
+from kmn_perception.camera import Camera
+from kmn_perception.observation import Surroundings, splat
 
 UNKNOWN, EMPTY = 0.0, np.inf  # metres
 BORDER_RUN = 8  # pixels at the image's sides that a sensor may not measure at all
@@ -41,6 +42,25 @@ def surroundings(
     """
     free = _free_depth(points, labels, to_camera[2].copy(), to_world[2].copy(), floor)
     return Surroundings(free, np.isnan(points[..., 2]))
+
+
+def surroundings_of_cloud(
+    points: NDArray[np.float32], camera: Camera, floor: float
+) -> Surroundings:
+    """Return up to which depth each pixel of a camera sees nothing of unorganised points.
+
+    Pixels without a point above the support are taken for empty.
+
+    Parameters
+    ----------
+    points
+        (N, 3) world frame, metres, NaN for none.
+    floor
+        World height in metres of what belongs to the support.
+    """
+    above = points[points[:, 2] > floor]
+    free = splat(camera, above, np.eye(4), 0)
+    return Surroundings(free, np.zeros(free.shape, dtype=np.bool_))
 
 
 @njit(cache=True)

@@ -126,6 +126,20 @@ def test_a_small_object_is_told_after_the_others_but_not_estimated() -> None:
     assert "at least 300 are needed" in found[1].estimate.reason
 
 
+def test_unorganised_points_hide_each_other_too() -> None:
+    front = (-0.05, -0.12, 0.1, 0.2, 0.1, 0.2, 0.0)
+    back = (0.05, 0.1, 0.1, 0.3, 0.1, 0.2, 0.0)
+    depth = render(np.array([unit_cube(box) for box in (TABLE, front, back)]), CAMERA)
+    points = depth_to_points(add_noise(depth, "kinect", np.random.default_rng(0)), KINECT)
+    cloud = points[np.isfinite(points[..., 2])]
+    np.random.default_rng(0).shuffle(cloud)
+    found = pipeline().estimate_all(cloud)
+    assert len(found) == 2
+    for one, box in zip(found, (front, back), strict=True):
+        assert_is(one, box)
+        assert one.mask.shape == (len(cloud),)
+
+
 PILLAR = (0.0, -0.12, 0.16, 0.06, 0.06, 0.32, 0.0)  # hides a strip from the table to the top
 
 

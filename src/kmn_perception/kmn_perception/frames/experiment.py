@@ -46,7 +46,7 @@ class FrameResult(NamedTuple):
     false_found
         Detections that belong to no labelled object: by the pipeline and by each baseline.
     seconds
-        That the pipeline took for the whole frame, the least of some repetitions.
+        Of one core that the pipeline took for the whole frame, the least of some repetitions.
     predictions, simulated_predictions
         Steps of the paper's network, which repeats one prediction, until the first that changes
         little: of each object that was found, and of its reference as rendered alone with the noise
@@ -142,12 +142,12 @@ def _run(
 def _estimate(
     points: NDArray[np.float32], pipeline: MorphPipeline
 ) -> tuple[list[ObjectEstimate], float]:
-    """Return all objects and the seconds that it took, without what other programs took away."""
+    """Return all objects, and the seconds that it took of one core, whatever else runs beside."""
     seconds = []
     for _ in range(REPETITIONS):
-        start = time.perf_counter()
+        start = time.process_time()
         objects = pipeline.estimate_all(points)
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
     return objects, min(seconds)
 
 

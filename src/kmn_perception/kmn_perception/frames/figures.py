@@ -181,7 +181,8 @@ def details(result: Figures) -> str:
             f"Size errors by side [mm]: {sides}",
             f"Objects of which less is visible: {hidden['found']} of {hidden['objects']} found",
             f"Sides stated as well known and wrong by far: {result['gross']}",
-            f"Milliseconds a frame: {times['median']:.0f} median, {times['max']:.0f} at most",
+            f"Milliseconds of one core a frame: {times['median']:.0f} median, "
+            f"{times['max']:.0f} at most",
             "Predictions of the paper's network until one changes little: "
             f"{_text(steps['real'], 1.0, 1)}, in simulation {_text(steps['simulated'], 1.0, 1)}",
             f"Standard deviations of the references: yaw {_text(own['yaw_deg']['median'], 1.0, 2)} "

@@ -30,6 +30,10 @@ build: $(BUILT)  ## set up the environment and build all packages (4 minutes the
 demo: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
 	@./run kmn_perception demo_bag
 
+.PHONY: demo-bag
+demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures
+	@./run kmn_perception demo_bag
+
 .PHONY: evaluate
 evaluate: build  ## regenerate docs/results, table and figures (half an hour; interrupted, it goes on)
 	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results

@@ -44,7 +44,9 @@ def test_it_finds_the_boxes_and_shows_them(domain: int, tmp_path: Path) -> None:
     assert process.returncode == 0, printed
     frames = [line for line in printed.splitlines() if line.startswith("frame")]
     assert len(frames) == 17
-    assert sum(" OK" in line for line in frames) >= 15
+    assert sum(line.endswith("objects, OK") for line in frames) >= 15
+    boxes = [line for line in printed.splitlines() if line.startswith("    object")]
+    assert sum(line.split("mm")[-1].strip() == "OK" for line in boxes) >= 36
     pictures = sorted(path.name for path in (tmp_path / "demo").glob("*.png"))
     assert pictures == ["all_frames.png", *(f"frame_{number:02d}.png" for number in range(17))]
     assert not left_behind(process.pid)

@@ -48,6 +48,7 @@ setup(
                 "demo_bag",
                 "train",
                 "evaluate",
+                "evaluate_frames",
                 "results",
                 "benchmark",
             )

@@ -26,6 +26,8 @@ FIELDS = {
     MorphingParameters: {
         "header": "std_msgs/Header",
         "model": "string",
+        "id": "uint32",
+        "cut": "boolean",
         "theta_names": "sequence<string>",
         "theta": "sequence<double>",
         "gamma_names": "sequence<string>",
@@ -62,6 +64,8 @@ numbers = st.lists(st.floats(), max_size=50)
 values = st.fixed_dictionaries(
     {
         "model": text,
+        "id": uint32,
+        "cut": st.booleans(),
         "theta_names": st.lists(text, max_size=4),
         "theta": numbers,
         "gamma_names": st.lists(text, max_size=4),

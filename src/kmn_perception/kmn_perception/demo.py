@@ -11,8 +11,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import rclpy
@@ -21,7 +22,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
-from tqdm import tqdm
+from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception import resources
@@ -31,30 +32,30 @@ from kmn_perception.estimator import Status
 from kmn_perception.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
-from kmn_perception.overlay import Overlay, save_contact_sheet, save_picture
+from kmn_perception.overlay import Overlay, ShownObject, save_pictures
 from kmn_perception.pipeline import PipelineSettings
 from kmn_perception.rendering import depth_to_points
 from kmn_perception.replay import Replay
-from kmn_perception.segmentation import remove_background
+from kmn_perception.segmentation import segment
 from kmn_perception.support_plane import find_support_plane, pose_above
 
-POINTS, PARAMETERS = "/points", "morphing_parameters"
+POINTS, PARAMETERS, MARKERS = "/points", "morphing_parameters", "morphed_model"
 RATE = 2.0  # frames a second
-REQUIRED = 15  # of the 17 frames
+REQUIRED = 15  # of the 17 frames with all objects valid
 START_TIMEOUT = 120.0  # seconds for morph_node to load and compile
 ANSWER_TIMEOUT = 20.0  # seconds for the parameters of one frame
 STOP_TIMEOUT = 10.0  # seconds for morph_node to end
 POLL_PERIOD = 0.1  # seconds
 LOG_LINES = 5  # of morph_node's, shown if it ends
+NOTHING: NDArray[np.float64] = np.empty((0, 4, 4))
 
 
 class DemoError(Exception):
     """The demo cannot go on; the text says why."""
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What morph_node made of a frame.
+class FoundObject(NamedTuple):
+    """What morph_node made of an object.
 
     Attributes
     ----------
@@ -63,65 +64,97 @@ class Answer:
     unit_cubes
         (B, 4, 4) bodies of the estimated model, see `KinematicModel.unit_cubes`; B = 0 if there
         is no estimate.
-    latency
-        Seconds from publishing the cloud to receiving the message.
     """
 
     parameters: MorphingParameters
     unit_cubes: NDArray[np.float64]
-    latency: float
 
     @property
     def status(self) -> Status:
         """What the parameters are worth."""
         return Status(self.parameters.status)
 
-    def describe(self) -> list[str]:
-        """Return the place, and the sides with the residual; nothing if there is no estimate."""
+    def describe(self) -> str:
+        """Return number, place, sides and status."""
         values = dict(zip(self.parameters.theta_names, self.parameters.theta, strict=True))
-        yaw, residual = math.degrees(values["yaw"]), 1e3 * self.parameters.residual
-        texts = []
+        texts = [f"object {self.parameters.id}"]
         for cube in self.unit_cubes:
             sides = 100.0 * np.linalg.norm(cube[:3, :3], axis=0)
-            texts.append(f"x {values['x']:6.3f} m  y {values['y']:6.3f} m  yaw {yaw:5.1f}°")
             size = " x ".join(f"{side:4.1f}" for side in sides)
-            texts.append(f"{size} cm  residual {residual:4.1f} mm")
-        return texts
+            yaw = math.degrees(values["yaw"])
+            texts.append(f"x {values['x']:6.3f} m  y {values['y']:6.3f} m  yaw {yaw:5.1f}°")
+            texts.append(f"{size} cm  residual {1e3 * self.parameters.residual:4.1f} mm")
+        return "  ".join([*texts, self.status.name, self.parameters.reason])
+
+
+class Answer(NamedTuple):
+    """What morph_node made of a frame, and the seconds from its publication to the answer."""
+
+    objects: list[FoundObject]
+    latency: float
+
+    @property
+    def valid(self) -> int:
+        """Number of objects whose parameters are valid."""
+        return sum(found.status is Status.OK for found in self.objects)
+
+    def describe(self) -> str:
+        """Return how many objects are valid."""
+        judged = "OK" if self.valid == len(self.objects) else f"{self.valid} OK"
+        return f"{len(self.objects)} objects, {judged}"
 
 
 class Listener:
-    """Waits for the morphing parameters of one frame after the other."""
+    """Waits for the objects of one frame after the other."""
 
     def __init__(self, node: Node, model: KinematicModel) -> None:
         self._model = model
-        self._received: dict[int, MorphingParameters] = {}
+        self._received: dict[int, list[MorphingParameters]] = {}
+        self._drawn: dict[int, int] = {}
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
-        node.create_subscription(MorphingParameters, PARAMETERS, self._receive, 10)
+        node.create_subscription(MorphingParameters, PARAMETERS, self._receive, 100)
+        node.create_subscription(MarkerArray, MARKERS, self._count, 10)
 
     def _receive(self, parameters: MorphingParameters) -> None:
-        self._received[Time.from_msg(parameters.header.stamp).nanoseconds] = parameters
+        stamp = Time.from_msg(parameters.header.stamp).nanoseconds
+        self._received.setdefault(stamp, []).append(parameters)
+
+    def _count(self, shown: MarkerArray) -> None:
+        """Count the bodies of a frame, by which it is known to be complete."""
+        added = sum(marker.action == Marker.ADD for marker in shown.markers)
+        self._drawn[Time.from_msg(shown.markers[0].header.stamp).nanoseconds] = added
 
     def wait_for(self, stamp: int) -> Answer | None:
         """Return the answer to the frame of this stamp in nanoseconds, None if there is none."""
         start = time.monotonic()
-        while stamp not in self._received:
+        while not self._is_complete(stamp):
             if time.monotonic() - start > ANSWER_TIMEOUT:
                 return None
             self._executor.spin_once(timeout_sec=POLL_PERIOD)
         latency = time.monotonic() - start
-        parameters = self._received[stamp]
-        cubes: NDArray[np.float64] = np.empty((0, 4, 4))
+        return Answer([self._found(parameters) for parameters in self._received[stamp]], latency)
+
+    def _is_complete(self, stamp: int) -> bool:
+        """Tell whether there is a message for each object that is drawn, or that there is none."""
+        if stamp not in self._drawn or stamp not in self._received:
+            return False
+        bodies = sum(len(self._found(p).unit_cubes) for p in self._received[stamp])
+        return bodies == self._drawn[stamp]
+
+    def _found(self, parameters: MorphingParameters) -> FoundObject:
+        cubes = NOTHING
         if np.isfinite([*parameters.theta, *parameters.gamma]).all():
             cubes = self._model.unit_cubes(parameters.theta, parameters.gamma)
-        return Answer(parameters, cubes, latency)
+        return FoundObject(parameters, cubes)
 
 
 def node_arguments() -> list[str]:
-    """Return the arguments that set a node up for boxes on a table, in a namespace of its own."""
+    """Return the arguments that set a node up for all boxes on a table, in its own namespace."""
     file = resources.find("config/nodes", "morph_node_tabletop")
     alone = f"__ns:=/demo_{os.getpid()}"  # whatever else runs here is not disturbed
-    return ["--ros-args", "--params-file", str(file), "-p", "reliability:=reliable", "-r", alone]
+    parameters = ["-p", "reliability:=reliable", "-p", "objects:=all"]
+    return ["--ros-args", "--params-file", str(file), *parameters, "-r", alone]
 
 
 class MorphNodeProcess:
@@ -175,8 +208,10 @@ def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> 
             answer = listener.wait_for(message.stamp)
             answers.append(answer)
             if answer:
-                texts = [*answer.describe(), f"{1e3 * answer.latency:4.0f} ms", answer.status.name]
-                print(f"frame {number:2d}", *texts, answer.parameters.reason, sep="  ", flush=True)
+                milliseconds = f"{1e3 * answer.latency:4.0f} ms"
+                print(f"frame {number:2d}", milliseconds, answer.describe(), sep="  ", flush=True)
+                for found in answer.objects:
+                    print(f"    {found.describe()}", flush=True)
             else:
                 process.check()
                 print(f"frame {number:2d}  no answer within {ANSWER_TIMEOUT:g} s", flush=True)
@@ -186,35 +221,28 @@ def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> 
 def draw_frames(
     answers: Sequence[Answer | None], model: KinematicModel, settings: PipelineSettings
 ) -> Iterator[Overlay]:
-    """Yield the picture of each frame: the points of its object and the estimated model."""
+    """Yield the picture of each frame: the points of its objects and the estimated models."""
     intrinsics = Camera.load(CAMERA)
     for number, (depth, answer) in enumerate(zip(load_frames(), answers, strict=True)):
         points = depth_to_points(depth, intrinsics)
         plane = find_support_plane(points, settings.plane)
         pose = model.camera.pose if plane is None else pose_above(plane, model.camera.pose)
-        texts = [*answer.describe(), answer.status.name] if answer else ["no answer"]
+        segments = segment(points, pose, pose[:3, 3], settings.background)
+        seen = [ShownObject(segments.of_object(i), NOTHING, True) for i in range(segments.objects)]
+        found = [
+            ShownObject(segments.points[:0], found.unit_cubes, found.status is Status.OK)
+            for found in (answer.objects if answer else [])
+        ]
         yield Overlay(
             depth=depth,
             camera=replace(intrinsics, pose=pose),
-            points=remove_background(points, pose, pose[:3, 3], settings.background),
-            unit_cubes=answer.unit_cubes if answer else np.empty((0, 4, 4)),
-            accepted=answer is not None and answer.status is Status.OK,
-            title=f"frame {number}: {texts.pop()}\n" + "\n".join(texts),
+            objects=[*seen, *found],
+            title=f"frame {number}: {answer.describe() if answer else 'no answer'}",
         )
 
 
-def save_pictures(overlays: Iterator[Overlay], count: int, folder: Path) -> Path:
-    """Write a picture of each frame, and one of all; return the latter's path."""
-    drawn = []
-    for number, overlay in enumerate(tqdm(overlays, "drawing", count, unit="frame")):
-        save_picture(folder / f"frame_{number:02d}.png", overlay)
-        drawn.append(overlay)
-    save_contact_sheet(folder / "all_frames.png", drawn)
-    return folder / "all_frames.png"
-
-
 def run(folder: Path) -> int:
-    """Run the demo in a folder; return the number of frames with status OK.
+    """Run the demo in a folder; return the number of frames of which all objects are valid.
 
     Raises
     ------
@@ -232,8 +260,11 @@ def run(folder: Path) -> int:
     answers = estimate_frames(node, model, bag, log)
     overlays = draw_frames(answers, model, settings.pipeline)
     sheet = save_pictures(overlays, len(answers), folder)
-    accepted = sum(answer is not None and answer.status is Status.OK for answer in answers)
-    print(f"{accepted} of {len(answers)} frames have status OK, {REQUIRED} are needed")
+    accepted = sum(bool(answer and answer.valid == len(answer.objects)) for answer in answers)
+    boxes = sum(answer.valid for answer in answers if answer)
+    print(
+        f"{boxes} boxes found; {accepted} of {len(answers)} frames have status OK for all objects"
+    )
     print(f"all frames: {sheet}\none by one: {folder / 'frame_00.png'} ...")
     return accepted
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+OK = "OK"  # the name of the status of what is as it should be
 
 
 class FrameStatistics:
@@ -16,6 +19,7 @@ class FrameStatistics:
         self._received = self._lost = self._dropped = self._clock_jumps = 0
         self._refused: Counter[str] = Counter()
         self._statuses: Counter[str] = Counter()
+        self._used = self._objects = 0
         self._latencies: list[float] = []
         self._last = "no frames received yet"
 
@@ -41,22 +45,23 @@ class FrameStatistics:
             self._refused[reason] += 1
             self._last = f"refused, {reason}: {text}"
 
-    def use(self, status: str, text: str, latency: float) -> None:
+    def use(self, results: Sequence[tuple[str, str]], latency: float) -> None:
         """Count a frame that was estimated.
 
         Parameters
         ----------
-        status
-            Name of the estimate's status.
-        text
-            Why it is not OK.
+        results
+            For each object the name of the estimate's status, and why it is not OK.
         latency
             Seconds from the reception of the frame to its estimate.
         """
         with self._lock:
-            self._statuses[status] += 1
+            self._used += 1
+            self._statuses.update(status for status, _ in results)
+            self._objects = sum(status == OK for status, _ in results)
             self._latencies.append(latency)
-            self._last = f"{status}: {text}" if text else status
+            wrong = [f"{status}: {text}" for status, text in results if status != OK]
+            self._last = "; ".join(wrong) or OK
 
     def report(self, name: str, period: float) -> DiagnosticStatus:
         """Return the counts and begin a new period.
@@ -70,14 +75,14 @@ class FrameStatistics:
         """
         with self._lock:
             latencies, self._latencies = self._latencies, []
-            used = self._statuses.total()
             values = {
                 "rate_hz": f"{len(latencies) / period:.2f}",
                 "latency_mean_ms": f"{1e3 * sum(latencies) / max(len(latencies), 1):.2f}",
                 "latency_max_ms": f"{1e3 * max(latencies, default=0.0):.2f}",
                 "frames_received": str(self._received),
                 "frames_lost": str(self._lost),
-                "frames_used": str(used),
+                "frames_used": str(self._used),
+                "objects_last": str(self._objects),
                 "frames_dropped": str(self._dropped),
                 "frames_refused": str(self._refused.total()),
                 **{f"refused_{key}": str(count) for key, count in sorted(self._refused.items())},
@@ -87,7 +92,7 @@ class FrameStatistics:
             }
             level = DiagnosticStatus.OK
             message = self._last
-            if self._last != "OK":
+            if self._last != OK:
                 level = DiagnosticStatus.WARN
             elif not latencies:
                 level, message = DiagnosticStatus.WARN, "no frames"

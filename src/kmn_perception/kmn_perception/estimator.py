@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -17,6 +18,8 @@ from kmn_perception.observation import Observation
 from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
+
+MOST = 0.9  # share of the points that must lie on the model, whatever else they show
 
 
 class Status(IntEnum):
@@ -43,6 +46,8 @@ class EstimatorSettings:
         Fewer points than this are not estimated.
     max_residual
         Largest median distance of the points to the predicted surface, metres.
+    max_deviation
+        Largest distance of nine tenths of the points to the predicted surface, metres.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
     refine
@@ -53,6 +58,7 @@ class EstimatorSettings:
     tolerance: float
     min_points: int
     max_residual: float
+    max_deviation: float
     limit_margin: float
     refine: bool
 
@@ -155,25 +161,49 @@ class MorphEstimator:
 
     def estimate(self, observation: Observation) -> Estimate:
         """Estimate the morphing parameters of an object, of which alone the points are."""
-        model, settings, points = self.model, self.settings, observation.points
-        if len(points) == 0:
-            return Estimate.none(model, 0, Status.NO_OBJECT, "no points of an object")
-        if len(points) < settings.min_points:
-            reason = f"{len(points)} points, at least {settings.min_points} are needed"
-            return Estimate.none(model, len(points), Status.TOO_FEW_POINTS, reason)
+        return self.estimate_all([observation])[0]
+
+    def estimate_all(self, observations: Sequence[Observation]) -> list[Estimate]:
+        """Estimate the morphing parameters of several objects, predicted together."""
+        enough = [o for o in observations if len(o.points) >= max(self.settings.min_points, 1)]
+        if not enough:
+            return [self._too_few(observation) for observation in observations]
         prediction, iterations = predict(
-            self.network, [observation], settings.iterations, settings.tolerance
+            self.network, enough, self.settings.iterations, self.settings.tolerance
         )
-        values, change = prediction.values[0], float(prediction.change[0])
+        estimates = (
+            self._finish(observation, values, float(change), iterations)
+            for observation, values, change in zip(
+                enough, prediction.values, prediction.change, strict=True
+            )
+        )
+        return [
+            next(estimates) if observation in enough else self._too_few(observation)
+            for observation in observations
+        ]
+
+    def _too_few(self, observation: Observation) -> Estimate:
+        count = len(observation.points)
+        if count == 0:
+            return Estimate.none(self.model, 0, Status.NO_OBJECT, "no points of an object")
+        reason = f"{count} points, at least {self.settings.min_points} are needed"
+        return Estimate.none(self.model, count, Status.TOO_FEW_POINTS, reason)
+
+    def _finish(
+        self, observation: Observation, values: NDArray[np.float64], change: float, iterations: int
+    ) -> Estimate:
+        """Refine what was predicted, and judge it."""
+        model, points = self.model, observation.points
         covariance: NDArray[np.float64] = np.full((len(values),) * 2, np.nan)
-        if settings.refine:
+        if self.settings.refine:
             fit = refine(model, observation, values, self.refinement)
             values, covariance, doubt = fit.values, fit.covariance, fit.reason
         else:
             doubt = self._doubt(change)
         theta, gamma = model.split(values)
-        residual = float(np.median(surface_distances(model.unit_cubes(theta, gamma), points)))
-        status, reason = self._judge(values, residual, doubt)
+        distances = surface_distances(model.unit_cubes(theta, gamma), points)
+        residual, deviation = np.quantile(distances, (0.5, MOST)).tolist()
+        status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(
             theta=theta,
             gamma=gamma,
@@ -197,7 +227,7 @@ class MorphEstimator:
         )
 
     def _judge(
-        self, values: NDArray[np.float64], residual: float, doubt: str
+        self, values: NDArray[np.float64], residual: float, deviation: float, doubt: str
     ) -> tuple[Status, str]:
         """Return the status of an estimate, and the reason if it is not OK."""
         settings = self.settings
@@ -211,5 +241,10 @@ class MorphEstimator:
             return Status.NOT_CONVERGED, (
                 f"the points lie {residual:.3f} m from the model, "
                 f"more than {settings.max_residual:g} m"
+            )
+        if not deviation <= settings.max_deviation:
+            return Status.NOT_CONVERGED, (
+                f"a tenth of the points lies more than {deviation:.3f} m from the model, "
+                f"{settings.max_deviation:g} m are allowed: it is of another shape"
             )
         return (Status.NOT_CONVERGED, doubt) if doubt else (Status.OK, "")

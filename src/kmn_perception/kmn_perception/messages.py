@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,7 +115,8 @@ def points_from_depth(image: Image, info: CameraInfo, max_range: float) -> NDArr
         raise MessageError(
             "size_mismatch",
             f"the depth image has {image.width} x {image.height} pixels, "
-            f"its camera_info {info.width} x {info.height}; expected the same size",
+            f"its camera_info {info.width} x {info.height}; expected the same size: "
+            "the camera_info is of another resolution or of another camera",
         )
     return depth_to_points(depth, camera)
 
@@ -138,6 +140,12 @@ def depth_from_image(image: Image, max_range: float) -> NDArray[np.float32]:
     depth = raw.astype(np.float32)
     if dtype.kind == "u":
         depth /= np.float32(MM_PER_M)
+    if np.count_nonzero(depth < 0.0) > depth.size / 2:
+        raise MessageError(
+            "flipped_z",
+            "most of the depth image is negative: z is flipped; expected depth along the optical "
+            "axis, forward",
+        )
     depth[~(depth > 0.0)] = np.nan
     depth[~_measured(depth, max_range)] = np.nan
     return depth
@@ -224,12 +232,22 @@ def info_from_camera(camera: Camera, header: Header) -> CameraInfo:
 
 
 def parameters_from_estimate(
-    model: KinematicModel, estimate: Estimate, header: Header
+    model: KinematicModel, estimate: Estimate, header: Header, number: int = 0, cut: bool = False
 ) -> MorphingParameters:
-    """Make the message of an estimate; the header names the world frame."""
+    """Make the message of an estimate; the header names the world frame.
+
+    Parameters
+    ----------
+    number
+        Of the object, 0 where there is but one.
+    cut
+        Whether the image's border cuts the object.
+    """
     return MorphingParameters(
         header=header,
         model=model.name,
+        id=number,
+        cut=cut,
         theta_names=[parameter.name for parameter in model.theta],
         theta=estimate.theta.tolist(),
         gamma_names=[parameter.name for parameter in model.gamma],
@@ -245,26 +263,34 @@ def parameters_from_estimate(
     )
 
 
-def markers_from_estimate(model: KinematicModel, estimate: Estimate, header: Header) -> MarkerArray:
-    """Draw the bodies of the estimated model as cubes, which replace the former ones.
+def markers_from_estimates(
+    model: KinematicModel, estimates: Sequence[Estimate], header: Header
+) -> MarkerArray:
+    """Draw the bodies of the estimated models as cubes, which replace the former ones.
 
     They are green where the estimate is valid, else red; without an object there are none.
     """
     markers = [Marker(header=header, ns=model.name, action=Marker.DELETEALL)]
-    if np.isfinite(estimate.theta).all() and np.isfinite(estimate.gamma).all():
-        colour = INVALID_COLOUR if estimate.reason else VALID_COLOUR
-        for number, cube in enumerate(model.unit_cubes(estimate.theta, estimate.gamma)):
-            marker = Marker(
-                header=header, ns=model.name, id=number, type=Marker.CUBE, action=Marker.ADD
-            )
-            size = np.linalg.norm(cube[:3, :3], axis=0)
-            x, y, z, w = quaternion_from_matrix(cube[:3, :3] / size).tolist()
-            marker.pose.position = Point(**dict(zip("xyz", cube[:3, 3].tolist(), strict=True)))
-            marker.pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
-            marker.scale = Vector3(**dict(zip("xyz", size.tolist(), strict=True)))
-            marker.color = colour
-            markers.append(marker)
+    for estimate in estimates:
+        if np.isfinite(estimate.theta).all() and np.isfinite(estimate.gamma).all():
+            colour = INVALID_COLOUR if estimate.reason else VALID_COLOUR
+            for cube in model.unit_cubes(estimate.theta, estimate.gamma):
+                markers.append(_marker(model.name, len(markers) - 1, cube, colour, header))
     return MarkerArray(markers=markers)
+
+
+def _marker(
+    namespace: str, number: int, cube: NDArray[np.float64], colour: ColorRGBA, header: Header
+) -> Marker:
+    """Draw a unit cube's map (4, 4) as a cube."""
+    marker = Marker(header=header, ns=namespace, id=number, type=Marker.CUBE, action=Marker.ADD)
+    size = np.linalg.norm(cube[:3, :3], axis=0)
+    x, y, z, w = quaternion_from_matrix(cube[:3, :3] / size).tolist()
+    marker.pose.position = Point(**dict(zip("xyz", cube[:3, 3].tolist(), strict=True)))
+    marker.pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
+    marker.scale = Vector3(**dict(zip("xyz", size.tolist(), strict=True)))
+    marker.color = colour
+    return marker
 
 
 def _bytes(values: NDArray[np.generic]) -> array.array[int]:
@@ -328,7 +354,7 @@ def _measured(reach: NDArray[np.float32], max_range: float) -> NDArray[np.bool_]
             raise MessageError(
                 "huge_values",
                 f"no point lies within {max_range:g} m, the nearest at {np.nanmin(reach):g} m; "
-                "expected metres",
+                "expected metres; if these are millimetres, divide by 1000",
             )
         raise MessageError("no_finite_points", f"none of the {reach.size} points was measured")
     return measured

@@ -31,13 +31,15 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.mailbox import Mailbox
 from kmn_perception.messages import (
     MessageError,
-    markers_from_estimate,
+    markers_from_estimates,
     parameters_from_estimate,
     points_from_cloud,
     points_from_depth,
 )
 from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
-from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.sensor_watch import SensorWatch
+from kmn_perception.tracking import ObjectTracker
 
 DIAGNOSTICS_PERIOD = 1.0  # seconds
 WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
@@ -48,20 +50,41 @@ class Frame(NamedTuple):
     """A message that waits for its estimation.
 
     ``read`` returns its points, given the maximal range, or raises `MessageError`; ``received``
-    is in seconds of the monotonic clock.
+    is in seconds of the monotonic clock; ``info`` is the description of a depth image.
     """
 
     header: Header
     read: Callable[[float], NDArray[np.float32]]
     received: float
+    info: CameraInfo | None = None
+
+
+class Found(NamedTuple):
+    """An object's estimate, its number (0 for one alone) and whether the image cuts it."""
+
+    estimate: Estimate
+    number: int
+    cut: bool
 
 
 class Answer(NamedTuple):
-    """An estimate with what its messages need."""
+    """The objects of a frame, with what their messages need."""
 
     model: KinematicModel
-    estimate: Estimate
     header: Header
+    objects: list[Found]
+
+    def parameters(self) -> list[MorphingParameters]:
+        """Return the message of each object."""
+        return [
+            parameters_from_estimate(self.model, found.estimate, self.header, *found[1:])
+            for found in self.objects
+        ]
+
+    def markers(self) -> MarkerArray:
+        """Return the message that shows all objects."""
+        estimates = [found.estimate for found in self.objects]
+        return markers_from_estimates(self.model, estimates, self.header)
 
 
 class Active(NamedTuple):
@@ -90,7 +113,9 @@ class MorphNode(Node):
         settings = NodeSettings.check(read_parameters(self))
         self._active = Active(settings, _load(settings))
         self._statistics = FrameStatistics()
+        self._sensor = SensorWatch(DIAGNOSTICS_PERIOD)
         self._mailbox: Mailbox[Frame] = Mailbox()
+        self._tracker = ObjectTracker(settings.object_distance)
         self._camera_info: CameraInfo | None = None
         self._image_without_info: Image | None = None
         self._last_source, self._last_stamp = "", 0
@@ -154,11 +179,15 @@ class MorphNode(Node):
         self._statistics.lose(max(0, number - self._sequence.get(topic, number) - 1))
         self._sequence[topic] = number
 
-    def _submit_image(self, image: Image, camera_info: CameraInfo) -> None:
-        self._submit("depth/image", image.header, partial(points_from_depth, image, camera_info))
+    def _submit_image(self, image: Image, info: CameraInfo) -> None:
+        self._submit("depth/image", image.header, partial(points_from_depth, image, info), info)
 
     def _submit(
-        self, source: str, header: Header, read: Callable[[float], NDArray[np.float32]]
+        self,
+        source: str,
+        header: Header,
+        read: Callable[[float], NDArray[np.float32]],
+        info: CameraInfo | None = None,
     ) -> None:
         """Hand the newest frame to the estimation thread."""
         stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
@@ -171,7 +200,7 @@ class MorphNode(Node):
             self._warn(
                 "clock_jump", f"stamps went back from {last_stamp / 1e9} s to {stamp / 1e9} s"
             )
-        replaced = self._mailbox.put(Frame(header, read, time.monotonic()))
+        replaced = self._mailbox.put(Frame(header, read, time.monotonic(), info))
         self._statistics.receive(replaced)
 
     def _on_estimate(
@@ -179,37 +208,57 @@ class MorphNode(Node):
     ) -> EstimateMorphing.Response:
         read = partial(points_from_cloud, request.points)
         self._statistics.receive(replaced=False)
-        answer = self._answer(Frame(request.points.header, read, time.monotonic()))
-        response.parameters = parameters_from_estimate(*answer)
+        answer = self._answer(Frame(request.points.header, read, time.monotonic()), False)
+        response.parameters = answer.parameters()[0]
         return response
 
     def _work(self) -> None:
         """Estimate and publish frame after frame until the mailbox is closed."""
         while (frame := self._mailbox.take()) is not None:
-            answer = self._answer(frame)
+            answer = self._answer(frame, self._active.settings.objects == "all")
             if self.context.ok():
-                self._parameters_publisher.publish(parameters_from_estimate(*answer))
-                self._model_publisher.publish(markers_from_estimate(*answer))
+                for parameters in answer.parameters():
+                    self._parameters_publisher.publish(parameters)
+                self._model_publisher.publish(answer.markers())
 
-    def _answer(self, frame: Frame) -> Answer:
+    def _answer(self, frame: Frame, all_objects: bool) -> Answer:
         """Estimate a frame; whatever is wrong with it becomes the reason of the answer."""
         settings, pipeline = self._active
         model = pipeline.estimator.model
         header = Header(stamp=frame.header.stamp, frame_id=settings.world_frame)
         try:
             points = frame.read(settings.max_range)
-            estimate = pipeline.estimate(points, frame.header.frame_id == settings.world_frame)
+            in_world = frame.header.frame_id == settings.world_frame
+            if not in_world:
+                for mistake in self._sensor.look(points, frame.header.frame_id, frame.info):
+                    self._warn(mistake.key, mistake.text)
+            objects = pipeline.estimate_all(points, in_world, None if all_objects else 1)
         except MessageError as error:
             self._refuse(error.reason, str(error))
-            return Answer(model, Estimate.none(model, 0, Status.NO_OBJECT, str(error)), header)
+            return Answer(model, header, [_none(model, str(error))])
         except Exception as error:  # a node never dies of a message
             self._refuse("internal_error", traceback.format_exc())
-            return Answer(model, Estimate.none(model, 0, Status.NO_OBJECT, repr(error)), header)
-        if estimate.status is not Status.OK:
-            self._warn(estimate.status.name, f"{estimate.status.name}: {estimate.reason}")
+            return Answer(model, header, [_none(model, repr(error))])
+        for found in objects:
+            status, reason = found.estimate.status, found.estimate.reason
+            if status is not Status.OK:
+                self._warn(status.name, f"{status.name}: {reason}")
         latency = time.monotonic() - frame.received
-        self._statistics.use(estimate.status.name, estimate.reason, latency)
-        return Answer(model, estimate, header)
+        results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
+        self._statistics.use(results, latency)
+        numbers = self._number(objects) if all_objects else [0]
+        return Answer(
+            model,
+            header,
+            [Found(o.estimate, number, o.cut) for o, number in zip(objects, numbers, strict=True)],
+        )
+
+    def _number(self, objects: Sequence[ObjectEstimate]) -> list[int]:
+        """Return the objects' numbers, which are those of the frames before."""
+        self._tracker.max_distance = self._active.settings.object_distance
+        seen = [found.observation.points for found in objects]
+        numbers = iter(self._tracker.update([p.mean(axis=0) for p in seen if len(p)]))
+        return [next(numbers) if len(p) else 0 for p in seen]
 
     def _refuse(self, reason: str, text: str) -> None:
         self._statistics.refuse(reason, text)
@@ -223,8 +272,9 @@ class MorphNode(Node):
             self.get_logger().warning(text)
 
     def _report(self) -> None:
-        name = f"{self.get_fully_qualified_name()}: frames"
-        report = DiagnosticArray(status=[self._statistics.report(name, DIAGNOSTICS_PERIOD)])
+        name = self.get_fully_qualified_name()
+        frames = self._statistics.report(f"{name}: frames", DIAGNOSTICS_PERIOD)
+        report = DiagnosticArray(status=[frames, self._sensor.report(f"{name}: sensor")])
         report.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_publisher.publish(report)
 
@@ -245,6 +295,11 @@ class MorphNode(Node):
         )
         self._active = Active(settings, MorphPipeline(estimator, settings.pipeline))
         return SetParametersResult(successful=True)
+
+
+def _none(model: KinematicModel, reason: str) -> Found:
+    """Return what a frame that cannot be read holds."""
+    return Found(Estimate.none(model, 0, Status.NO_OBJECT, reason), 0, False)
 
 
 def _load(settings: NodeSettings) -> MorphPipeline:

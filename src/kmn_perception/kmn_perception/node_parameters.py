@@ -20,6 +20,7 @@ from kmn_perception.segmentation import SegmentationSettings
 from kmn_perception.support_plane import SupportPlaneSettings
 
 RELIABILITIES = ("best_effort", "reliable")
+OBJECTS = ("nearest", "all")
 CAMERA_POSES = tuple(pose.value for pose in CameraPose)
 LENGTHS = {"camera_position": 3, "camera_quaternion": 4, "crop_min": 3, "crop_max": 3}
 
@@ -42,6 +43,10 @@ class NodeSettings:
         Frame of the parameters; clouds in it need no camera pose.
     reliability
         Of the subscriptions, ``best_effort`` or ``reliable``.
+    objects
+        Which ones are estimated, ``nearest`` or ``all``.
+    object_distance
+        By which an object's centre may move between two frames, metres.
     max_range
         Coordinates beyond it are not measurements, metres.
     estimator, pipeline
@@ -52,6 +57,8 @@ class NodeSettings:
     weights: str
     world_frame: str
     reliability: str
+    objects: str
+    object_distance: float
     max_range: float
     estimator: EstimatorSettings
     pipeline: PipelineSettings
@@ -71,6 +78,7 @@ class NodeSettings:
                     f"'{name}' must be {length} finite numbers, found {list(values[name])}"
                 )
         _check_choice("reliability", values["reliability"], RELIABILITIES)
+        _check_choice("objects", values["objects"], OBJECTS)
         _check_choice("camera_pose", values["camera_pose"], CAMERA_POSES)
         for name in ("model", "world_frame"):
             if not values[name]:
@@ -85,6 +93,8 @@ class NodeSettings:
             weights=values["weights"],
             world_frame=values["world_frame"],
             reliability=values["reliability"],
+            objects=values["objects"],
+            object_distance=values["object_distance"],
             max_range=values["max_range"],
             estimator=_pick(EstimatorSettings, values),
             pipeline=PipelineSettings(
@@ -161,6 +171,12 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "reliability": _any(
         "Reliability of the subscriptions (REP-2003).", " or ".join(RELIABILITIES), read_only=True
     ),
+    "objects": _any("Which objects of a frame are estimated.", " or ".join(OBJECTS)),
+    "object_distance": _real(
+        "Of all objects, one keeps its id while its centre moves less between two frames [m].",
+        0.0,
+        10.0,
+    ),
     "camera_pose": _any(
         "Where the camera's optical frame is in the world.", " or ".join(CAMERA_POSES)
     ),
@@ -179,9 +195,12 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "crop_max": _any("Upper corner of the crop volume, world frame [m].", "3 numbers"),
     "remove_plane": _any("Remove the support plane z = 0 and what lies below it."),
     "plane_margin": _real("Height above z = 0 that belongs to the support plane [m].", 0.0, 0.5),
-    "cluster": _any("Keep only the nearest large cluster."),
+    "cluster": _any("Part the points into clusters; large ones are objects."),
     "cluster_step": _real("Larger steps between neighbours part clusters [m].", 0.001, 1.0),
     "cluster_min_points": _whole("Smaller clusters are not objects.", 1, 1_000_000),
+    "cluster_crease": _real(
+        "Sharper concave creases of a surface part clusters; 0: none do [rad].", 0.0, 3.0
+    ),
     "iterations": _whole("Largest number N of predictions (Algorithm 1).", 1, 100),
     "tolerance": _real(
         "Without refinement: converged when the last step changed theta by less [m, rad, 1].",
@@ -190,6 +209,9 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     ),
     "min_points": _whole("Objects of fewer points are not estimated.", 1, 1_000_000),
     "max_residual": _real("Largest median distance of the points to the model [m].", 0.0, 10.0),
+    "max_deviation": _real(
+        "Largest distance of nine tenths of the points to the model [m].", 0.0, 10.0
+    ),
     "limit_margin": _real(
         "Part of its range by which a parameter may exceed its limits.", 0.0, 1.0
     ),

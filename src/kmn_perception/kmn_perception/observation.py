@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,6 +13,28 @@ from kmn_perception.camera import Camera
 from kmn_perception.kinematic_model import KinematicModel
 
 FARTHEST = 1.0 / 256.0  # what is farther than ``far`` still differs from the background
+
+
+class Surroundings(NamedTuple):
+    """What a sensor saw in the pixels (height, width) that show no point of an object.
+
+    Attributes
+    ----------
+    free_depth
+        Depth in metres up to which a pixel was seen to be empty: infinite for all of its line of
+        sight, 0 where nothing is known. Beyond it the object may be hidden.
+    presumed
+        Nothing was measured there; the depth is what those beside it suggest.
+    """
+
+    free_depth: NDArray[np.float32]
+    presumed: NDArray[np.bool_]
+
+
+def empty_surroundings(height: int, width: int) -> Surroundings:
+    """Return what a sensor saw that saw nothing else."""
+    free_depth = np.full((height, width), np.inf, dtype=np.float32)
+    return Surroundings(free_depth, np.zeros((height, width), dtype=np.bool_))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +47,17 @@ class Observation:
         (N, 3) world frame, metres, finite.
     camera
         The sensor: its intrinsics, the size of its image and its pose in the world. What lies
-        outside its image was not seen, what lies inside without a point was seen to be empty.
+        outside its image was not seen.
     floor
         Height (metres, world z) up to which points were lost with the support plane.
+    surroundings
+        What was seen elsewhere; ``None``: all of it is empty.
     """
 
     points: NDArray[np.float32]
     camera: Camera
     floor: float = -np.inf
+    surroundings: Surroundings | None = None
 
 
 def point_cloud_to_depth(

@@ -1,12 +1,16 @@
-"""Background removal: the points of one object out of a whole scene (paper, Sec. IV-D)."""
+"""Background removal: the points of objects out of a whole scene (paper, Sec. IV-D)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from kmn_perception.creases import find_creases
+from kmn_perception.union_find import join, number
 
 INFINITE = np.full(3, np.inf)
 NEIGHBOURS = np.array(
@@ -35,6 +39,9 @@ class SegmentationSettings:
         unorganised points it is the size of the voxels whose neighbourhood joins them.
     cluster_min_points
         Smaller clusters are not objects.
+    cluster_crease
+        Surfaces that meet at a concave angle, and deviate by more than this from a flat one, belong
+        to different clusters, radians; 0 for none. Only organised points tell.
     """
 
     crop: bool
@@ -45,15 +52,38 @@ class SegmentationSettings:
     cluster: bool
     cluster_step: float
     cluster_min_points: int
+    cluster_crease: float
 
 
-def remove_background(
+class Segments(NamedTuple):
+    """The objects' points among all.
+
+    Attributes
+    ----------
+    points
+        (N, 3) all points in the world frame, metres; NaN for none.
+    labels
+        (N,) of the objects 0, 1, ..., the nearest first; -1 for other points.
+    objects
+        Number of objects.
+    """
+
+    points: NDArray[np.float32]
+    labels: NDArray[np.int32]
+    objects: int
+
+    def of_object(self, label: int) -> NDArray[np.float32]:
+        """Return the points (M, 3) of an object."""
+        return _select(self.points, self.labels == label)
+
+
+def segment(
     points: NDArray[np.float32],
     pose: NDArray[np.float64],
     viewpoint: NDArray[np.float64],
     settings: SegmentationSettings,
-) -> NDArray[np.float32]:
-    """Return the object's points in the world frame.
+) -> Segments:
+    """Tell the objects' points from the others.
 
     Parameters
     ----------
@@ -62,27 +92,51 @@ def remove_background(
     pose
         (4, 4) transformation of the points to the world frame.
     viewpoint
-        (3,) where the camera stands in the world frame, from which the nearest cluster counts.
-
-    Returns
-    -------
-    points
-        (M, 3) finite points, world frame, metres; M = 0 if there is no object.
+        (3,) where the camera stands in the world frame.
     """
     corners = (settings.crop_min, settings.crop_max) if settings.crop else (-INFINITE, INFINITE)
     low, high = np.array(corners)
     if settings.remove_plane:
         low[2] = max(low[2], settings.plane_margin)
     world, kept = _crop(points.reshape(-1, 3), pose, low, high)
-    if settings.cluster and kept.any():
-        step = settings.cluster_step
-        if points.ndim == 3:
-            labels = _label_image(world.reshape(points.shape), kept, step)
-        else:
-            labels = _label_cloud(world, kept, step)
-        eye = np.ascontiguousarray(viewpoint)  # compiled once, whatever it is a part of
-        kept = _in_nearest(world, labels, eye, settings.cluster_min_points)
-    return _select(world, kept)
+    if not settings.cluster or not kept.any():
+        return Segments(world, kept.astype(np.int32) - 1, int(kept.any()))
+    eye = np.ascontiguousarray(viewpoint)  # compiled once, whatever it is a part of
+    if points.ndim == 3:
+        labels = _part_image(world.reshape(points.shape), kept, eye, settings)
+    else:
+        labels = _label_cloud(world, kept, settings.cluster_step)
+    return Segments(world, *_sort(world, labels, eye, settings.cluster_min_points))
+
+
+def remove_background(
+    points: NDArray[np.float32],
+    pose: NDArray[np.float64],
+    viewpoint: NDArray[np.float64],
+    settings: SegmentationSettings,
+) -> NDArray[np.float32]:
+    """Return the nearest object's points (M, 3) in the world frame; M = 0 if there is no object.
+
+    The parameters are those of `segment`.
+    """
+    return segment(points, pose, viewpoint, settings).of_object(0)
+
+
+def _part_image(
+    points: NDArray[np.float32],
+    kept: NDArray[np.bool_],
+    viewpoint: NDArray[np.float64],
+    settings: SegmentationSettings,
+) -> NDArray[np.int32]:
+    """Label organised points by what hangs together without a step and without a crease."""
+    labels = _label_image(points, kept, settings.cluster_step)
+    if settings.cluster_crease == 0.0:
+        return labels
+    creases = find_creases(points, labels, viewpoint, settings.cluster_crease)
+    if not creases.any():
+        return labels
+    parts = _label_image(points, kept & ~creases, settings.cluster_step)
+    return _grow(points, parts, kept, settings.cluster_step, settings.cluster_min_points)
 
 
 @njit(cache=True)
@@ -122,10 +176,10 @@ def _label_image(
         for i in range(row * width, (row + 1) * width):
             if kept[i]:
                 if i > row * width and kept[i - 1] and _near(flat, i, i - 1, step):
-                    _join(parents, i, i - 1)
+                    join(parents, i, i - 1)
                 if row > 0 and kept[i - width] and _near(flat, i, i - width, step):
-                    _join(parents, i, i - width)
-    return _number(parents, kept)
+                    join(parents, i, i - width)
+    return number(parents, kept)
 
 
 def _label_cloud(
@@ -148,32 +202,73 @@ def _label_voxels(keys: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArra
     for offset in offsets:
         for i, j in enumerate(np.searchsorted(keys, keys + offset)):
             if j < len(keys) and keys[j] == keys[i] + offset:
-                _join(parents, i, j)
-    return _number(parents, np.ones(len(keys), dtype=np.bool_))
+                join(parents, i, j)
+    return number(parents, np.ones(len(keys), dtype=np.bool_))
 
 
 @njit(cache=True)
-def _in_nearest(
+def _grow(
+    points: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    kept: NDArray[np.bool_],
+    step: float,
+    min_points: int,
+) -> NDArray[np.int32]:
+    """Give kept pixels that belong to no large part to the part from which fewest steps lead."""
+    width, flat = points.shape[1], points.reshape(-1, 3)
+    counts = np.zeros(labels.max() + 2, dtype=np.int64)
+    for label in labels:
+        counts[label] += 1
+    grown = np.full_like(labels, -1)
+    queue = np.empty(len(labels), dtype=np.int32)
+    last = 0
+    for i in range(len(labels)):
+        if labels[i] >= 0 and counts[labels[i]] >= min_points:
+            grown[i], queue[last] = labels[i], i
+            last += 1
+    first = 0
+    while first < last:
+        i = queue[first]
+        first += 1
+        column = i % width
+        for k in range(4):
+            j = i + (1, -1, width, -width)[k]
+            outside = j < 0 or j >= len(labels) or (k == 0 and column == width - 1)
+            if outside or (k == 1 and column == 0) or not kept[j] or grown[j] >= 0:
+                continue
+            if _near(flat, i, j, step):
+                grown[j], queue[last] = grown[i], j
+                last += 1
+    return grown
+
+
+@njit(cache=True)
+def _sort(
     points: NDArray[np.float32],
     labels: NDArray[np.int32],
     viewpoint: NDArray[np.float64],
     min_points: int,
-) -> NDArray[np.bool_]:
-    """Tell which points belong to the large cluster of the smallest mean distance, if any."""
+) -> tuple[NDArray[np.int32], int]:
+    """Return the labels of the large clusters, ordered by mean distance, and their number."""
     counts = np.zeros(labels.max() + 1, dtype=np.int64)
-    sums = np.zeros(len(counts))
+    distances = np.zeros(len(counts))
     for i in range(len(labels)):
         if labels[i] >= 0:
             x = points[i, 0] - viewpoint[0]
             y = points[i, 1] - viewpoint[1]
             z = points[i, 2] - viewpoint[2]
             counts[labels[i]] += 1
-            sums[labels[i]] += np.sqrt(x * x + y * y + z * z)
-    nearest, distance = -2, np.inf
-    for label in range(len(counts)):
-        if counts[label] >= min_points and sums[label] / counts[label] < distance:
-            nearest, distance = label, sums[label] / counts[label]
-    return labels == nearest
+            distances[labels[i]] += np.sqrt(x * x + y * y + z * z)
+    places, count = np.full(len(counts), -1, dtype=np.int32), 0
+    for label in np.argsort(distances / np.maximum(counts, 1)):
+        if counts[label] >= min_points:
+            places[label] = count
+            count += 1
+    numbered = np.full_like(labels, -1)
+    for i in range(len(labels)):
+        if labels[i] >= 0:
+            numbered[i] = places[labels[i]]
+    return numbered, count
 
 
 @njit(cache=True)
@@ -196,38 +291,3 @@ def _near(points: NDArray[np.float32], i: int, j: int, step: float) -> bool:
     y = points[i, 1] - points[j, 1]
     z = points[i, 2] - points[j, 2]
     return x * x + y * y + z * z <= step * step
-
-
-@njit(cache=True)
-def _root(parents: NDArray[np.int32], i: int) -> int:
-    """Find the representative of a union-find set, halving the path to it."""
-    while parents[i] != i:
-        parents[i] = parents[parents[i]]
-        i = parents[i]
-    return i
-
-
-@njit(cache=True)
-def _join(parents: NDArray[np.int32], i: int, j: int) -> None:
-    """Join two union-find sets; the smallest index represents a set."""
-    a, b = _root(parents, i), _root(parents, j)
-    if a < b:
-        parents[b] = a
-    else:
-        parents[a] = b
-
-
-@njit(cache=True)
-def _number(parents: NDArray[np.int32], kept: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return labels 0, 1, ... of the union-find sets of the kept elements; -1 for the others."""
-    labels = np.full(len(parents), -1, dtype=np.int32)
-    count = 0
-    for i in range(len(parents)):
-        if kept[i]:
-            root = _root(parents, i)
-            if root == i:
-                labels[i] = count
-                count += 1
-            else:
-                labels[i] = labels[root]
-    return labels

@@ -14,6 +14,7 @@ SETTINGS = EstimatorSettings(
     tolerance=0.02,
     min_points=100,
     max_residual=0.03,
+    max_deviation=0.1,
     limit_margin=0.1,
     refine=True,
 )

@@ -17,8 +17,10 @@ from kmn_perception.overlay import (
     ACCEPTED,
     EDGE_PIECES,
     OBJECT,
+    REFERENCE,
     REFUSED,
     Overlay,
+    ShownObject,
     save_contact_sheet,
     save_picture,
     wireframe,
@@ -83,7 +85,8 @@ def _overlay(accepted: bool) -> Overlay:
     cubes = _cuboid((0, 0, 0), 0.4)[None]
     depth = render(cubes, CAMERA)
     seen = depth_to_points(depth, CAMERA)[np.isfinite(depth)]
-    return Overlay(depth, CAMERA, transform_points(CAMERA.pose, seen), cubes, accepted, "a box")
+    shown = ShownObject(transform_points(CAMERA.pose, seen), cubes, accepted)
+    return Overlay(depth, CAMERA, [shown], "a box")
 
 
 def _count(picture: Path, colour: str) -> int:
@@ -104,14 +107,29 @@ def test_the_picture_shows_a_valid_prediction_in_green_and_a_refused_one_in_red(
 
 
 def test_without_a_prediction_the_scene_alone_is_shown(tmp_path: Path) -> None:
-    nothing = replace(
-        _overlay(accepted=False),
-        points=np.empty((0, 3), np.float32),
-        unit_cubes=np.empty((0, 4, 4)),
-    )
+    nothing = replace(_overlay(accepted=False), objects=[])
     save_picture(tmp_path / "nothing.png", nothing)
     assert _count(tmp_path / "nothing.png", REFUSED) == 0
     assert _count(tmp_path / "nothing.png", OBJECT) == 0
+
+
+def test_several_objects_each_have_their_colour_and_hide_each_other(tmp_path: Path) -> None:
+    one = _overlay(accepted=True)
+    behind = ShownObject(
+        np.empty((0, 3), np.float32), _cuboid((0.45, 0.5, 0.0), 0.3)[None], accepted=False
+    )
+    save_picture(tmp_path / "both.png", replace(one, objects=[*one.objects, behind]))
+    save_picture(tmp_path / "behind.png", replace(one, objects=[behind]))
+    assert _count(tmp_path / "both.png", ACCEPTED) > 1000
+    assert 100 < _count(tmp_path / "both.png", REFUSED) < _count(tmp_path / "behind.png", REFUSED)
+
+
+def test_references_are_drawn_beside(tmp_path: Path) -> None:
+    save_picture(
+        tmp_path / "both.png",
+        replace(_overlay(accepted=True), references=_cuboid((0, 0, 0), 0.3)[None]),
+    )
+    assert _count(tmp_path / "both.png", REFERENCE) > 100
 
 
 def test_the_contact_sheet_shows_every_frame(tmp_path: Path) -> None:

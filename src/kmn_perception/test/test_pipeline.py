@@ -7,18 +7,53 @@ from types import ModuleType
 import numba
 import yaml
 
-from kmn_perception import observation, rendering, residual, resources, segmentation, windows
+from kmn_perception import (
+    creases,
+    fragments,
+    observation,
+    rendering,
+    residual,
+    resources,
+    segmentation,
+    surroundings,
+    union_find,
+    windows,
+)
 from kmn_perception.estimator import MorphEstimator, Status
 from kmn_perception.node_parameters import NodeSettings
 from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.refinement import (
+    capture,
+    correlation,
+    edges,
+    geometry,
+    image,
+    misfit,
+    planes,
+    silhouette,
+    view,
+)
 
 from .conftest import RealFrame
 
 COMPILED: tuple[ModuleType, ...] = (
+    capture,
+    correlation,
+    creases,
+    edges,
+    fragments,
+    geometry,
+    image,
+    misfit,
     observation,
+    planes,
     rendering,
     residual,
     segmentation,
+    silhouette,
+    surroundings,
+    union_find,
+    view,
     windows,
 )
 
@@ -46,7 +81,8 @@ def test_a_real_carton_is_estimated_and_nothing_is_compiled_for_it(real_frame: R
     pipeline = tabletop()
     pipeline.warm_up()
     before = compiled_signatures()
-    estimate = pipeline.estimate(real_frame.points)
+    found = pipeline.estimate_all(real_frame.points)
     assert compiled_signatures() == before
-    assert estimate.status is Status.OK, estimate.reason
-    assert estimate.residual < 0.015
+    for one in found:
+        assert one.estimate.status is Status.OK, one.estimate.reason
+        assert one.estimate.residual < 0.015

@@ -29,6 +29,7 @@ SETTINGS = SegmentationSettings(
     cluster=True,
     cluster_step=0.02,
     cluster_min_points=50,
+    cluster_crease=0.5,
 )
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)

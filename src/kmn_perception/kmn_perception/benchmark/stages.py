@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
 from kmn_perception.messages import (
-    markers_from_estimate,
+    markers_from_estimates,
     parameters_from_estimate,
     points_from_cloud,
 )
@@ -46,18 +46,19 @@ def chain(
     def callback() -> None:
         estimate = pipeline.estimate(message_to_array())
         parameters_from_estimate(model, estimate, cloud.header)
-        markers_from_estimate(model, estimate, cloud.header)
+        markers_from_estimates(model, [estimate], cloud.header)
 
     points = message_to_array()
-    observation = pipeline.observe(points)
-    if observation is None or not len(observation.points):
+    views = pipeline.observe(points, most=1)
+    if not views:
         raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
+    observation = views[0].observation
     seen, first = [observation], network.start([observation])
     images = network.render_anew(0, seen, first)
     predicted, _ = predict(network, seen, STEPS)
     return {
         "message_to_array": message_to_array,
-        "background_removal": lambda: pipeline.observe(points),
+        "background_removal": lambda: pipeline.observe(points, most=1),
         "splat": lambda: network.render_anew(0, seen, first),
         "network": lambda: network.predict(0, images),
         "predictions": lambda: predict(network, seen, STEPS),

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import Shape, cuboids
-from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.image import Image, may_hide
 from kmn_perception.refinement.view import View, meet, meet_any, view_of
 
 
@@ -65,7 +65,7 @@ def support(view: View, image: Image, body: int) -> float:
     A pixel shows the body when its depth is nearer to the body's than to that of what the model has
     behind it. A body that is out of view has full support.
     """
-    solids, inverse_depth = view.solids, image.inverse_depth
+    solids, inverse_depth, presumed = view.solids, image.inverse_depth, image.presumed
     height, width = inverse_depth.shape
     first = max(0, int(np.ceil(max(solids[body, 0], 0.0))))
     last = min(width - 1, int(np.floor(min(solids[body, 1], width - 1.0))))
@@ -83,7 +83,9 @@ def support(view: View, image: Image, body: int) -> float:
                 if other != body:
                     inverse, _ = meet(solids, other, u, v)
                     behind = max(behind, inverse)
-            seen = inverse_depth[row, column]
+            seen = float(inverse_depth[row, column])
+            if seen <= 0.0 and may_hide(seen, presumed[row, column], nearest):
+                continue
             count += 1
             if 0.5 * (nearest + behind) < seen < 1.5 * nearest - 0.5 * behind:
                 shown += 1

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.correlation import alike
 from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.silhouette import EdgeSettings, half_chord, scan, split
 from kmn_perception.refinement.view import PLANES, View, add_normal_equations
@@ -25,6 +26,8 @@ ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 FAR = 6.0  # standard deviations inside its own side, where a pixel says nothing more
 LOST = 0.25  # weight of a coarse sample without a step
 PHASES = 3.0  # an edge that crosses 1/3 of a pixel along its way averages where it cuts the rows
+LAGS = 32  # samples of an edge that may be shifted alike
+EXACT = 0.5  # pixels by which the pixels' grid shifts a step
 VISIBLE = 0.5  # share of an edge's samples with a step, from which on it is in view
 
 
@@ -113,7 +116,7 @@ def _add_edge(
 ) -> bool:
     """Add the samples of an edge, one in each row (or column); tell whether it is in view."""
     solids, lines, all_ends, faces = view.solids, view.lines[b], view.ends[b], view.faces[b]
-    inverse_depth, upwards = image.inverse_depth, image.upwards
+    inverse_depth, presumed, upwards = image.inverse_depth, image.presumed, image.upwards
     lowest = image.floor + settings.floor_margin
     evidence = np.empty(4 * LARGEST_WINDOW)
     line, ends = lines[edge], all_ends[edge]
@@ -126,6 +129,7 @@ def _add_edge(
     last = min(extent - 1, math.floor(high - border))
     samples = max(last - first + 1, 1)
     sharpness = max(noise, 1.0 / samples)
+    shifts = np.zeros(samples)
     seen, found = 0, 0
     for a in range(first, last + 1, 1 + samples // most):
         position = -(line[along] * a + line[2]) / line[1 - along]
@@ -136,8 +140,8 @@ def _add_edge(
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(
-            solids, inverse_depth, settings, depth_noise, b, line[1 - along], at_edge, rows, a,
-            position, window, chord, evidence,
+            solids, inverse_depth, presumed, settings, depth_noise, b, line[1 - along],
+            at_edge, rows, a, position, window, chord, evidence,
         )  # fmt: skip
         if count == 0:
             continue
@@ -147,16 +151,21 @@ def _add_edge(
                 lines, faces, edge, start, step, a, rows, evidence[:count], sharpness,
                 _taper(a, low + border, high - border, border), moment, force, sums,
             )  # fmt: skip
-        behind = split(evidence[:count])
-        has_step = 0 < behind < count
+        fewest, most_behind = split(evidence[:count])
+        behind = (position - start) * step + 0.5
+        has_step = fewest > 0 and most_behind < count
         clipped = start == 0 or start == width - 1
         if has_step:
             found += 1
-        elif noise > 0.0 or (behind == 0 and clipped):
+        elif noise > 0.0 or (most_behind == 0 and clipped):
             continue
+        if fewest < behind < most_behind:
+            continue  # nothing is known that the edge contradicts
+        behind = min(max(behind, fewest), most_behind)
         at = start + step * (behind - 0.5)
         u, v = (at, float(a)) if rows else (float(a), at)
         distance = line[0] * u + line[1] * v + line[2]
+        shifts[a - first] = np.sign(distance) * max(abs(distance) - EXACT, 0.0)
         if noise > 0.0:
             weight = 1.0 / (1.0 / 12.0 + noise**2) / samples  # all together, like a single row
         else:
@@ -166,10 +175,21 @@ def _add_edge(
         _add(moment, force, weight, weight * distance, u, v)
     if noise > 0.0:
         span = PHASES * (last - first) * abs(line[along] / line[1 - along])
-        rounding = 1.0 / (1.0 + moment[2, 2] / (12.0 * (1.0 + span**2)))
-        moment *= rounding
-        force *= rounding
+        weight = 1.0 / (1.0 + moment[2, 2] / (12.0 * (1.0 + span**2)))
+        weight *= _independent(shifts)
+        moment *= weight
+        force *= weight
     return found > VISIBLE * seen
+
+
+@njit(cache=True, error_model="numpy")
+def _independent(shifts: NDArray[np.float64]) -> float:
+    """Return the share of an edge's samples that say something of their own.
+
+    The edges of real objects are not quite straight, and a sensor may shift all of one alike.
+    """
+    alone = (shifts**2).sum()
+    return alone / alike(shifts, LAGS) if alone > 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -209,7 +229,7 @@ def _add_probit(
         unlikely = 1.0 - likely
         push = density / likely
         information = density * push / unlikely
-        sums[0] -= weight * math.log(likely)
+        sums[0] -= weight * math.log(likely / sure)  # no pixel costs if it fits
         sums[1] += weight * t * push
         sums[2] += weight * t * t * information
         _add(moment, force, weight * information / noise**2, -weight * sign * push / noise, u, v)

@@ -8,10 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.observation import Observation
+from kmn_perception.observation import Observation, empty_surroundings
 from kmn_perception.refinement.view import projection
 
 HALF = 0.5
+THICKNESS = 0.02  # metres; other objects are at least as thick
+PRESUMED = 0.01  # metres by which presumed depths may be wrong
 LEAST_RANGE = 1e-6  # metres
 
 
@@ -21,7 +23,11 @@ class Image(NamedTuple):
     Attributes
     ----------
     inverse_depth
-        (height, width) 1 / m; 0 where nothing was seen.
+        (height, width) 1 / m where the object was seen. Elsewhere it is the negative of the inverse
+        depth up to which the pixel was seen to be empty: 0 for all of its line of sight, minus
+        infinity where nothing is known.
+    presumed
+        (height, width) nothing was measured there.
     pixels
         (N, 3) u, v and inverse depth of all that was seen.
     projection
@@ -36,6 +42,7 @@ class Image(NamedTuple):
     """
 
     inverse_depth: NDArray[np.float32]
+    presumed: NDArray[np.bool_]
     pixels: NDArray[np.float32]
     projection: NDArray[np.float64]
     upwards: NDArray[np.float64]
@@ -48,12 +55,17 @@ def image_of(observation: Observation) -> Image:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
-    inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    around = observation.surroundings
+    if around is None:
+        around = empty_surroundings(camera.height, camera.width)
+    with np.errstate(divide="ignore"):
+        inverse_depth = np.float32(-1.0) / around.free_depth
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
     return Image(
         inverse_depth,
+        around.presumed,
         pixels,
         matrix,
         upwards,
@@ -61,6 +73,22 @@ def image_of(observation: Observation) -> Image:
         1.0 / max(camera.near, LEAST_RANGE),
         1.0 / camera.far,
     )
+
+
+@njit(cache=True, error_model="numpy")
+def may_hide(seen: float, presumed: bool, inverse_depth: float) -> bool:
+    """Tell whether something may be at an inverse depth, though the pixel does not show it.
+
+    It cannot be just behind what was measured, where the inside of another object is. What is
+    presumed may be the surface of the very object, but not behind it.
+
+    Parameters
+    ----------
+    seen, presumed
+        The pixel's values in `Image`; the former is not positive.
+    """
+    margin = -PRESUMED if presumed else THICKNESS
+    return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen + margin
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.image import Image, may_hide
 from kmn_perception.refinement.view import View, meet_any
 
 MOST = 15  # times as many pixels as asked for are looked at in all
@@ -19,7 +19,7 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 
     A pixel that shows something where the model has nothing, or the other way round, counts 1, and
     a wrong depth its square, up to 1; the sum is divided by the number of pixels seen. Where the
-    model is out of the sensor's range, nothing need be seen.
+    model is out of the sensor's range or may be hidden, nothing need be seen.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
-    """Return the number of pixels that show nothing, though the model is there."""
-    inverse_depth = image.inverse_depth
+    """Return the number of pixels that were seen to be empty, though the model is there."""
+    inverse_depth, presumed = image.inverse_depth, image.presumed
     height, width = inverse_depth.shape
     left, right = max(solids[:, 0].min(), 0.0), min(solids[:, 1].max(), width - 1.0)
     top, bottom = max(solids[:, 2].min(), 0.0), min(solids[:, 3].max(), height - 1.0)
@@ -58,8 +58,10 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
     unseen = 0
     for row in range(int(np.ceil(top / step)) * step, int(bottom) + 1, step):
         for column in range(int(np.ceil(left / step)) * step, int(right) + 1, step):
-            if inverse_depth[row, column] == 0.0:
-                unseen += _predicted(solids, image, float(column), float(row)) > 0.0
+            seen = float(inverse_depth[row, column])
+            if seen <= 0.0:
+                predicted = _predicted(solids, image, float(column), float(row))
+                unseen += predicted > 0.0 and not may_hide(seen, presumed[row, column], predicted)
     return float(unseen * step**2)
 
 

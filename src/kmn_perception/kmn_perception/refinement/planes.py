@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.correlation import alike
 from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.view import PLANES, View, add_normal_equations, meet_any
 
@@ -107,23 +108,14 @@ def plane_terms(
                 continue
             moment, force = moments[body, face], forces[body, face]
             moment[1, 0], moment[2, 0], moment[2, 1] = moment[0, 1], moment[0, 2], moment[1, 2]
-            in_rows, in_columns = _alike(row_sums[body, face]), _alike(column_sums[body, face])
-            alike = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
+            in_rows, in_columns = (
+                alike(row_sums[body, face], LAGS),
+                alike(column_sums[body, face], LAGS),
+            )
+            often = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
             slopes = view.plane_slopes[body, face]
-            add_normal_equations(hessian, gradient, slopes, moment / alike, force / alike)
+            add_normal_equations(hessian, gradient, slopes, moment / often, force / often)
     return PlaneTerms(hessian, gradient, residuals[:count])
-
-
-@njit(cache=True, error_model="numpy")
-def _alike(sums: NDArray[np.float64]) -> float:
-    """Return the variance of the sum of the residuals of all rows, as those of each row show it.
-
-    Neighbouring rows may be shifted alike, too (Newey and West).
-    """
-    variance = alone = (sums**2).sum()
-    for lag in range(1, LAGS):
-        variance += 2.0 * (1.0 - lag / LAGS) * (sums[lag:] * sums[:-lag]).sum()
-    return max(alone, variance)
 
 
 @njit(cache=True, error_model="numpy")

@@ -206,13 +206,14 @@ def _fine(section: Section) -> FineSettings:
 
 
 def _edges(section: Section) -> EdgeSettings:
-    section.allow(("occluder", "background", "contrast", "floor_margin", "outliers"))
+    section.allow(("occluder", "background", "contrast", "floor_margin", "outliers", "presumed"))
     return EdgeSettings(
         occluder=section.number("occluder", 0.0, 10.0),
         background=section.number("background", 0.0, 100.0),
         contrast=section.number("contrast", 0.0, 10.0),
         floor_margin=section.number("floor_margin", 0.0, 10.0),
         outliers=section.number("outliers", 1e-12, 0.49),
+        presumed=section.number("presumed", 0.0, 1.0),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.refinement.image import may_hide
 from kmn_perception.refinement.view import meet
 
 CERTAIN = 5.0  # standard deviations that tell two depths apart
@@ -30,6 +31,8 @@ class EdgeSettings(NamedTuple):
         Edges less than this above the floor are not used, metres.
     outliers
         Share of pixels that show anything.
+    presumed
+        Of the probability, where nothing was measured.
     """
 
     occluder: float
@@ -37,12 +40,14 @@ class EdgeSettings(NamedTuple):
     contrast: float
     floor_margin: float
     outliers: float
+    presumed: float
 
 
 @njit(cache=True, error_model="numpy")
 def scan(
     solids: NDArray[np.float64],
     inverse_depth: NDArray[np.float32],
+    presumed: NDArray[np.bool_],
     settings: EdgeSettings,
     depth_noise: float,
     b: int,
@@ -92,9 +97,14 @@ def scan(
         if expected == 0.0:
             expected = at_edge
         seen = float(inverse_depth[row, column])
+        if seen <= 0.0 and may_hide(seen, presumed[row, column], expected):
+            evidence[k] = 0.0
+            continue
         evidence[k] = _evidence(
             solids, settings, depth_noise, b, float(column), float(row), seen, expected
         )
+        if presumed[row, column]:
+            evidence[k] *= settings.presumed
     return start, step, count
 
 
@@ -118,7 +128,7 @@ def _evidence(
             if met > expected:
                 return 0.0
             behind = max(behind, met)
-    if seen == 0.0:
+    if seen <= 0.0:
         return -certain
     depth = 1.0 / seen - 1.0 / expected
     if depth < -settings.occluder and seen > expected + CERTAIN * depth_noise:
@@ -161,15 +171,20 @@ def half_chord(
 
 
 @njit(cache=True, error_model="numpy")
-def split(evidence: NDArray[np.float64]) -> int:
-    """Return how many pixels, from outside, to put behind so that the fewest are wrong."""
+def split(evidence: NDArray[np.float64]) -> tuple[int, int]:
+    """Return how many pixels, from outside, to put behind so that the fewest are wrong.
+
+    The least and the largest number differ where nothing is known of the pixels between them.
+    """
     cost = 0
     for k in range(evidence.shape[0]):
         if evidence[k] < 0.0:
             cost += 1
-    least, best = cost, 0
+    cheapest, first, last = cost, 0, 0
     for k in range(evidence.shape[0]):
         cost += int(np.sign(evidence[k]))
-        if cost < least:
-            least, best = cost, k + 1
-    return best
+        if cost < cheapest:
+            cheapest, first, last = cost, k + 1, k + 1
+        elif cost == cheapest and last == k and evidence[k] == 0.0:
+            last = k + 1
+    return first, last

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera, look_at
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
+from kmn_perception.observation import Observation, Surroundings
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.sensor import add_noise
+from kmn_perception.surroundings import EMPTY, UNKNOWN
 from kmn_perception.training.settings import SensorSettings
 
 LEAST_POINTS = 100  # a sample of which less is seen is drawn again
@@ -73,8 +74,11 @@ def _observe_from_around(
     cubes = model.unit_cubes(*model.split(values))
     camera = _place(_camera(sensor.camera), cubes[:, :3, 3].mean(axis=0), model, sensor, generator)
     depth = add_noise(render(cubes, camera), sensor.noise, generator)
+    free = np.full_like(depth, EMPTY)
     if generator.uniform() < sensor.holes:
+        measured = np.isfinite(depth)
         _punch_holes(depth, generator)
+        free[measured & np.isnan(depth)] = UNKNOWN
     believed = replace(camera, pose=_wrong(camera.pose, sensor.pose_error, generator))
     cloud = depth_to_cloud(depth, believed)
     floor = generator.uniform(0.0, sensor.cut_height)
@@ -82,8 +86,25 @@ def _observe_from_around(
     if len(cloud) and generator.uniform() < sensor.occlusion:
         direction = generator.standard_normal(3)
         along = cloud @ direction.astype(np.float32)
-        cloud = cloud[along >= np.quantile(along, generator.uniform(0.0, 0.4))]
-    return Observation(cloud, believed, floor)
+        nearest = float(np.quantile(along, generator.uniform(0.0, 0.4)))
+        _hide(free, depth, believed, direction, nearest)
+        cloud = cloud[along >= nearest]
+    return Observation(cloud, believed, floor, Surroundings(free, np.zeros_like(free, np.bool_)))
+
+
+def _hide(
+    free: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    camera: Camera,
+    direction: NDArray[np.float64],
+    nearest: float,
+) -> None:
+    """Let pixels be unknown whose points, or points beside the object, lie before a plane."""
+    v, u = np.indices(depth.shape, dtype=np.float32)
+    a, b, c = direction @ camera.pose[:3, :3]
+    along = (u - camera.cx) * (a / camera.fx) + (v - camera.cy) * (b / camera.fy) + c
+    along *= np.where(np.isnan(depth), np.nanmedian(depth), depth)
+    free[along < nearest - direction @ camera.pose[:3, 3]] = UNKNOWN
 
 
 def _punch_holes(depth: NDArray[np.float32], generator: np.random.Generator) -> None:

@@ -1,0 +1,1 @@
+"""The experiment on real frames: references from labels, the estimates, and their errors."""

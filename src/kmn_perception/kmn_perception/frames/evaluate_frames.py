@@ -1,0 +1,65 @@
+"""Estimate the boxes in labelled depth frames, and compare them with plane fits to the labels."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from kmn_perception.command_line import output_file
+from kmn_perception.frames.experiment import FrameResult, load_pipeline, run
+from kmn_perception.frames.figures import details, figures, method_table, object_table
+from kmn_perception.frames.labelled_frame import FramesError, read_frames
+from kmn_perception.frames.pictures import draw
+from kmn_perception.frames.settings import FramesSettings
+from kmn_perception.overlay import save_pictures
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.resources import share_directory
+
+
+def evaluate(folder: Path, pipeline: MorphPipeline, settings: FramesSettings) -> list[FrameResult]:
+    """Return the result of every frame of a folder.
+
+    Raises
+    ------
+    FramesError
+        If the folder's files are not as expected.
+    """
+    frames = read_frames(folder)
+    progress = tqdm(run(frames, pipeline, settings), "frames", len(frames), unit="frame")
+    return list(progress)
+
+
+def main() -> int:
+    """Run the executable ``evaluate_frames``."""
+    parser = argparse.ArgumentParser(prog="evaluate_frames", description=__doc__)
+    parser.add_argument(
+        "folder", type=Path, nargs="?", default=share_directory() / "data" / "kinect_boxes",
+        help="with NAME_d.png (16 bits, mm) and NAME_l.png (labels); default: the shipped ones",
+    )  # fmt: skip
+    parser.add_argument("--json", type=output_file, help="file to write the figures to")
+    parser.add_argument("--out", type=Path, help="folder to write a picture of each frame to")
+    options = parser.parse_args()
+    settings, pipeline = FramesSettings.load(), load_pipeline()
+    try:
+        results = evaluate(options.folder, pipeline, settings)
+    except FramesError as error:
+        print(f"evaluate_frames: {error}", file=sys.stderr)
+        return 1
+    summary = figures(results, settings)
+    print(object_table(results), method_table(summary), sep="\n\n")
+    print("", details(summary), sep="\n")
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+        overlays = draw(results, pipeline.estimator.model, settings)
+        print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
+    if options.json:
+        options.json.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

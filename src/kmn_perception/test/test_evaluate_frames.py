@@ -1,0 +1,125 @@
+"""The experiment on labelled frames as a command, its baselines, and bad folders."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from kmn_perception.frames.baselines import BASELINES
+from kmn_perception.frames.labelled_frame import FramesError, read_frames
+from kmn_perception.frames.upright_box import UprightBox, errors, intersection_over_union
+from kmn_perception.resources import share_directory
+
+SHIPPED = share_directory() / "data" / "kinect_boxes"
+KEYS = (
+    "frames", "objects", "found", "false_found", "yaw_error_deg", "size_error_m",
+    "centre_error_m", "iou", "coverage95", "milliseconds", "baselines",
+)  # fmt: skip
+
+
+def _copy(folder: Path, *numbers: int) -> Path:
+    for number in numbers:
+        for kind in "dl":
+            shutil.copy(SHIPPED / f"learn{number}_{kind}.png", folder)
+    return folder
+
+
+def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "kmn_perception.frames.evaluate_frames", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_it_writes_figures_and_pictures_with_the_baselines_beside(tmp_path: Path) -> None:
+    frames, out = tmp_path / "frames", tmp_path / "pictures"
+    frames.mkdir()
+    done = _evaluate(_copy(frames, 2, 14), "--json", tmp_path / "e.json", "--out", out)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "e.json").read_text())
+    assert [key for key in result if key in KEYS] == [*KEYS]
+    assert (result["frames"], result["objects"], result["less_visible"]["objects"]) == (2, 4, 1)
+    assert result["found"] == 4
+    assert result["false_found"] == 0
+    assert 0.0 < result["yaw_error_deg"]["median"] < 1.5
+    assert result["size_error_m"]["median"] < 0.005
+    assert result["centre_error_m"]["median"] < 0.005
+    assert result["iou"]["median"] > 0.85
+    assert result["baselines"].keys() == BASELINES.keys()
+    for baseline in result["baselines"].values():
+        assert baseline["size_error_m"]["median"] > result["size_error_m"]["median"]
+    assert "learn14 40" in done.stdout
+    assert sorted(path.name for path in out.iterdir()) == [
+        "all_frames.png", "frame_00.png", "frame_01.png",
+    ]  # fmt: skip
+
+
+def test_a_frame_without_a_table_in_the_depth_counts_its_objects_as_not_found(
+    tmp_path: Path,
+) -> None:
+    _copy(tmp_path, 0)
+    depth = cv2.imread(str(tmp_path / "learn0_d.png"), cv2.IMREAD_UNCHANGED)
+    assert depth is not None
+    labels = cv2.imread(str(tmp_path / "learn0_l.png"), cv2.IMREAD_UNCHANGED)
+    assert labels is not None
+    table = np.argwhere(labels == 1)
+    kept = table[np.random.default_rng(0).choice(len(table), 500, replace=False)]
+    emptied = np.where(labels == 1, 0, depth)
+    emptied[tuple(kept.T)] = depth[tuple(kept.T)]  # enough for the reference alone
+    cv2.imwrite(str(tmp_path / "learn0_d.png"), emptied)
+    done = _evaluate(tmp_path, "--json", tmp_path / "e.json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "e.json").read_text())
+    assert (result["objects"], result["found"], result["false_found"]) == (1, 0, 0)
+    assert result["yaw_error_deg"] == {"median": None, "p95": None}
+
+
+def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None:
+    assert "holds no file *_d.png" in _evaluate(tmp_path).stderr
+    _copy(tmp_path, 3)
+    (tmp_path / "learn3_l.png").unlink()
+    with pytest.raises(FramesError, match="learn3_l.png is missing"):
+        read_frames(tmp_path)
+    cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint16))
+    with pytest.raises(FramesError, match="expected one channel of uint8"):
+        read_frames(tmp_path)
+    cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((240, 320), dtype=np.uint8))
+    with pytest.raises(FramesError, match="labels of 320 x 240 pixels for a depth image of 640"):
+        read_frames(tmp_path)
+    cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint8))
+    with pytest.raises(FramesError, match="0 measured pixels are labelled 1, expected a table"):
+        read_frames(tmp_path)
+
+
+def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    names = [frame.name for frame in read_frames(_copy(tmp_path, 10, 2, 1))]
+    assert names == ["learn1", "learn2", "learn10"]
+
+
+def _surface(box: UprightBox) -> NDArray[np.float32]:
+    """Draw points on all faces of a box."""
+    random = np.random.default_rng(0)
+    local, axis = random.uniform(-0.5, 0.5, size=(4000, 3)), random.integers(3, size=4000)
+    rows = np.arange(len(local))
+    local[rows, axis] = np.sign(local[rows, axis]) / 2.0
+    cube = box.unit_cube
+    return (local @ cube[:3, :3].T + cube[:3, 3]).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", list(BASELINES))
+def test_baselines_find_a_box_that_is_seen_from_all_sides(name: str) -> None:
+    box = UprightBox(np.array([0.1, -0.2, 0.1]), np.array([0.3, 0.15, 0.2]), 0.4)
+    found = BASELINES[name](_surface(box))
+    off = errors(found, box)
+    assert np.degrees(off.yaw) < 0.5
+    assert off.size.max() < 0.003
+    assert intersection_over_union(found, box) > 0.97

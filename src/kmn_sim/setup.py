@@ -21,7 +21,13 @@ setup(
     entry_points={
         "console_scripts": [
             f"{name} = {PACKAGE}.executables:{name}"
-            for name in ("sim_node", "snapshot", "check_perception", "benchmark")
+            for name in (
+                "sim_node",
+                "snapshot",
+                "check_perception",
+                "benchmark",
+                "robot_description",
+            )
         ],
     },
 )

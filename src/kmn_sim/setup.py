@@ -25,6 +25,7 @@ setup(
                 "sim_node",
                 "snapshot",
                 "check_perception",
+                "check_noise",
                 "benchmark",
                 "robot_description",
             )

@@ -17,10 +17,10 @@ from rclpy.utilities import remove_ros_args
 from kmn_perception.columns import columns
 from kmn_perception.command_line import output_file, whole_number
 from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.node_process import ProcessError
 from kmn_sim.check_perception import whole_scenes
 from kmn_sim.depth_camera import DepthCamera
 from kmn_sim.live import live_scenes
-from kmn_sim.processes import ProcessError
 from kmn_sim.renderer import RENDERERS
 from kmn_sim.scenario import Scenario
 from kmn_sim.simulation import Simulation

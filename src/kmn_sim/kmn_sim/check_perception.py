@@ -18,9 +18,9 @@ from kmn_perception.camera import Camera
 from kmn_perception.columns import columns
 from kmn_perception.command_line import output_file, whole_number
 from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.node_process import ProcessError
 from kmn_sim.kinect import NOISES
 from kmn_sim.live import Answer, live_scenes
-from kmn_sim.processes import ProcessError
 
 TOLERANCE = 0.01  # metres, radians and scales
 MARGIN = 2.0  # pixels of the image around what is wholly in view

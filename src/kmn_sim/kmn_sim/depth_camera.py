@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.camera import Camera
 from kmn_perception.transformation import rotation_z
-from kmn_sim.kinect import measure
+from kmn_sim.kinect import Kinect, KinectSettings
 from kmn_sim.simulation import Simulation
 
 MOUNTS = ("world", "base")
@@ -31,8 +31,8 @@ class DepthCamera:
     """
 
     def __init__(self, camera: Camera, mount: str, noise: str, seed: int) -> None:
-        self._camera, self._mount, self._noise = camera, mount, noise
-        self._generator = np.random.default_rng(seed)
+        self._camera, self._mount = camera, mount
+        self._kinect = Kinect(KinectSettings.load(), seed) if noise == "kinect" else None
 
     def camera(self, simulation: Simulation) -> Camera:
         """Return the camera where it is at present, in the world."""
@@ -46,4 +46,4 @@ class DepthCamera:
     def capture(self, simulation: Simulation) -> NDArray[np.float32]:
         """Return the depth image (height, width) at present, metres, NaN for none."""
         exact = simulation.renderer.render(self.camera(simulation)).depth
-        return measure(exact, self._noise, self._generator)
+        return exact if self._kinect is None else self._kinect.measure(exact, self._camera.fx)

@@ -30,5 +30,6 @@ def _executable(module: str) -> Callable[[], int | None]:
 sim_node = _executable("start_sim_node")
 snapshot = _executable("snapshot")
 check_perception = _executable("check_perception")
+check_noise = _executable("check_noise")
 benchmark = _executable("benchmark")
 robot_description = _executable("robot_description")

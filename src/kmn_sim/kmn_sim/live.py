@@ -20,8 +20,8 @@ from rclpy.parameter import Parameter
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.node_process import NodeProcess, ProcessError
 from kmn_sim.messages import seconds
-from kmn_sim.processes import NodeProcess, ProcessError
 
 START_TIMEOUT = 180.0  # seconds for both nodes to load and compile
 ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene

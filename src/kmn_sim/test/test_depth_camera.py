@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,10 +12,8 @@ from numpy.typing import NDArray
 from kmn_perception.camera import Camera
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.rendering import render
-from kmn_perception.resources import share_directory
 from kmn_sim.clipping import nearest_depth
 from kmn_sim.depth_camera import DepthCamera
-from kmn_sim.kinect import measure
 from kmn_sim.renderer import RENDERERS
 from kmn_sim.scenario import Scenario
 from kmn_sim.simulation import Simulation
@@ -100,50 +97,3 @@ def test_nothing_that_is_seen_lies_before_the_clipping_plane() -> None:
         bound = nearest_depth(camera, np.array([[centre - size / 2.0, centre + size / 2.0]]))
         if np.isfinite(depth).any():
             assert bound <= np.nanmin(depth) + 1e-6
-
-
-def plane(distance: float) -> NDArray[np.float32]:
-    """Return the depth image of a plane that faces the camera."""
-    return np.full((120, 160), distance, dtype=np.float32)
-
-
-@pytest.mark.parametrize(
-    ("distance", "expected"), [(0.6, 0.78e-3), (0.8, 1.13e-3), (1.0, 1.76e-3), (1.23, 2.56e-3)]
-)
-def test_noise_is_of_the_size_measured_on_real_frames(distance: float, expected: float) -> None:
-    noisy = measure(plane(distance), "kinect", np.random.default_rng(0))
-    assert np.nanstd(noisy) == pytest.approx(expected, rel=0.3)
-
-
-def test_depth_comes_in_the_steps_of_real_frames() -> None:
-    near = 0.95, 1.05
-    noisy = np.unique(measure(plane(1.0), "kinect", np.random.default_rng(0)))
-    frame: Any = cv2.imread(
-        str(share_directory() / "data/kinect_boxes/learn0_d.png"), cv2.IMREAD_UNCHANGED
-    )
-    steps = []
-    for levels in (noisy, np.unique(frame) / 1e3):
-        levels = levels[(levels > near[0]) & (levels < near[1])]
-        steps.append((1.0 / levels[0] - 1.0 / levels[-1]) / (len(levels) - 1))
-    assert steps[0] == pytest.approx(steps[1], rel=0.03)
-
-
-def test_shadow_lies_to_the_left_and_is_as_wide_as_the_disparity_steps() -> None:
-    depth = plane(1.2)
-    depth[40:80, 60:100] = 0.8
-    shadow = 0.075 * 575.8 * (1 / 0.8 - 1 / 1.2)
-    missing = np.zeros(depth.shape)
-    for seed in range(20):
-        missing += np.isnan(measure(depth, "kinect", np.random.default_rng(seed))) / 20
-    beside = missing[45:75].mean(axis=0)
-    assert beside[: 60 - int(shadow) - 6].max() < 0.05
-    assert beside[60 - int(shadow) + 3 : 57].min() > 0.95
-    assert beside[103:].max() < 0.05
-
-
-def test_the_same_seed_gives_the_same_noise() -> None:
-    first, again, other = (
-        measure(plane(1.0), "kinect", np.random.default_rng(seed)) for seed in (1, 1, 2)
-    )
-    np.testing.assert_array_equal(first, again)
-    assert (first != other).any()

@@ -1,0 +1,165 @@
+"""Compare the simulated Kinect with real frames, scene by scene: the same camera, table and box."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from kmn_perception.camera import Camera
+from kmn_perception.columns import columns
+from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.observation import Observation
+from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.resources import share_directory
+from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
+from kmn_sim.kinect import Kinect, KinectSettings
+from kmn_sim.noise_statistics import inverse_step, missing_runs, plane_noise
+
+CAMERA = "kinect_v1"
+TABLE, BOX = 1, 20  # labels; the first object has nothing before it
+PLANE = SupportPlaneSettings(distance=0.01, max_tilt=1.3, min_fraction=0.2)
+ESTIMATOR = EstimatorSettings(10, 0.05, 200, 0.03, 0.1, refine=True)
+FLOOR = 0.008  # metres above the table that belong to it
+TABLE_SIZE = (6.0, 6.0, 0.01)  # metres
+DISTANCES = (0.6, 0.8, 1.0, 1.2)  # metres
+REACH = 0.05  # metres about each distance
+LEVELS = (0.95, 1.05)  # metres between which the steps of the depth are counted
+
+
+class Frame(NamedTuple):
+    """A depth image (height, width), metres, and where table and box are in it."""
+
+    depth: NDArray[np.float32]
+    table: NDArray[np.bool_]
+    box: NDArray[np.bool_]
+
+
+class Twins(NamedTuple):
+    """A real frame and the simulated one of the same scene."""
+
+    real: Frame
+    simulated: Frame
+
+
+def frames() -> Iterator[tuple[NDArray[np.uint16], NDArray[np.uint8]]]:
+    """Yield depth (mm, 0 for none) and labels (height, width) of the shipped real frames."""
+    for file in sorted((share_directory() / "data" / "kinect_boxes").glob("*_d.png")):
+        labels = file.with_name(file.name.replace("_d", "_l"))
+        depth, label = (cv2.imread(str(f), cv2.IMREAD_UNCHANGED) for f in (file, labels))
+        yield np.asarray(depth, dtype=np.uint16), np.asarray(label, dtype=np.uint8)
+
+
+def twins(count: int, seed: int) -> Iterator[Twins]:
+    """Yield real frames with their simulated twins, at most ``count``."""
+    model = MorphEstimator.load("box", "", ESTIMATOR)
+    settings = KinectSettings.load()
+    for number, (millimetres, labels) in zip(range(count), frames(), strict=False):
+        depth = np.where(millimetres, millimetres / 1e3, np.nan).astype(np.float32)
+        real = Frame(depth, labels == TABLE, labels == BOX)
+        scene = scene_of(real, model)
+        if scene is not None:
+            kinect = Kinect(settings, seed + number)
+            yield Twins(real, simulate(*scene, kinect))
+
+
+def scene_of(frame: Frame, estimator: MorphEstimator) -> tuple[Camera, NDArray[np.float64]] | None:
+    """Return the camera and the box's cuboids (B, 4, 4) of a real frame, None if not found."""
+    camera = Camera.load(CAMERA)
+    points = depth_to_points(frame.depth, camera)
+    plane = find_support_plane(points, PLANE)
+    if plane is None:
+        return None
+    pose = pose_above(plane, estimator.model.camera.pose)
+    camera = replace(camera, pose=pose)
+    seen = points[frame.box & np.isfinite(frame.depth)] @ pose[:3, :3].T + pose[:3, 3]
+    estimate = estimator.estimate(Observation(seen.astype(np.float32), camera, FLOOR))
+    if estimate.status != Status.OK:
+        return None
+    return camera, estimator.model.unit_cubes(estimate.theta, estimate.gamma)
+
+
+def simulate(camera: Camera, box: NDArray[np.float64], kinect: Kinect) -> Frame:
+    """Return what the simulated sensor measures of a box on a table, in whole millimetres."""
+    table = np.diag([*TABLE_SIZE, 1.0])
+    table[2, 3] = -TABLE_SIZE[2] / 2.0
+    exact = render(np.concatenate([table[None], box]), camera)
+    is_box = render(box, camera) == exact
+    depth = np.round(1e3 * kinect.measure(exact, camera.fx)) / 1e3
+    return Frame(depth.astype(np.float32), np.isfinite(exact) & ~is_box, is_box)
+
+
+def noise(images: Sequence[Frame]) -> dict[str, float]:
+    """Return the noise about the table by distance, and the steps of the depth."""
+    patches = [plane_noise(image.depth, image.table) for image in images]
+    means, deviations = (np.concatenate(parts) for parts in zip(*patches, strict=True))
+    result = {}
+    for distance in DISTANCES:
+        near = np.abs(means - distance) < REACH
+        result[f"noise at {distance:g} m [mm]"] = 1e3 * float(np.median(deviations[near]))
+    steps = [inverse_step(image.depth, *LEVELS) for image in images]
+    result["step of 1 / depth [1/km]"] = 1e3 * float(np.median(steps))
+    return result
+
+
+def missing(pairs: Sequence[Twins]) -> list[dict[str, float]]:
+    """Return what is missing beside the boxes, of the rows that both images of a pair show."""
+    results: list[dict[str, float]] = [{}, {}]
+    for side, step in (("left", -1), ("right", 1)):
+        runs = np.concatenate(
+            [[missing_runs(f.depth, f.box, f.table, step) for f in pair] for pair in pairs], axis=1
+        )
+        for result, known in zip(results, runs[:, (runs >= 0).all(axis=0)], strict=True):
+            for name, percentile in (("median", 50.0), ("90 %", 90.0)):
+                value = float(np.percentile(known, percentile))
+                result[f"missing to the {side}, {name} [px]"] = value
+            result[f"missing to the {side}, mean [px]"] = float(known.mean())
+    return results
+
+
+def compare(count: int, seed: int) -> dict[str, dict[str, float]]:
+    """Return the statistics ``real`` and ``simulated`` of at most so many frames."""
+    total = min(count, sum(1 for _ in frames()))
+    pairs = list(tqdm(twins(count, seed), total=total, unit="frame"))
+    return {
+        name: {**noise(images), **beside}
+        for name, images, beside in zip(
+            Twins._fields, zip(*pairs, strict=True), missing(pairs), strict=True
+        )
+    }
+
+
+def arguments() -> argparse.Namespace:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(prog="check_noise", description=__doc__)
+    parser.add_argument("--frames", type=whole_number(1), default=17, help="at most (default 17)")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of the noise")
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Run the executable ``check_noise``."""
+    options = arguments()
+    result = compare(options.frames, options.seed)
+    rows = [["statistic", *result]]
+    for name in result["real"]:
+        rows.append([name, *(f"{values[name]:.2f}" for values in result.values())])
+    print(columns(rows))
+    if options.json:
+        Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -36,7 +36,7 @@ def motion(times: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def make_plan() -> Plan:
-    times = np.linspace(0.0, 10.0, 101)
+    times = np.arange(101) / 10.0
     part = times[:, None] / 10.0
     door = np.column_stack(
         [np.interp(times, [8, 10], [0, -0.9]), np.interp(times, [6, 8], [0, -0.7])]
@@ -84,13 +84,12 @@ def test_the_parts_hold_all_points_of_the_plan() -> None:
     np.testing.assert_allclose(np.unique(covered.round(6)), PLAN.times[1:], atol=1e-6)
 
 
-@pytest.mark.parametrize("period", [0.004, 0.02, 0.13, 0.9])
-@pytest.mark.parametrize("duration", [0.5, 2.0, 3.3, 60.0])
+@pytest.mark.parametrize(
+    ("period", "duration"), [(0.004, 0.5), (0.13, 0.5), (0.02, 2.0), (0.9, 3.3), (0.9, 60.0)]
+)
 def test_each_part_comes_after_the_former_began_and_before_it_ends(
     period: float, duration: float
 ) -> None:
-    if period > duration / 2.0:
-        pytest.skip("states come too seldom for such parts")
     sent = run(period, replace(SETTINGS, part_duration=duration))
     for (_, former), (time, part) in zip(sent, sent[1:], strict=False):
         assert former.start <= time <= part.start
@@ -111,7 +110,8 @@ def test_it_says_where_it_is() -> None:
     execution = Execution(PLAN, BEGIN, SETTINGS)
     for elapsed, phase in ((-0.2, "reach"), (3.9, "reach"), (5.0, "grasp"), (7.0, "press")):
         step = execution.step(START + elapsed, state(START + elapsed))
-        assert (step.phase, step.progress) == (phase, pytest.approx(max(elapsed, 0.0) / 10.0))
+        assert step.phase == phase
+        assert step.progress == pytest.approx(max(elapsed, 0.0) / 10.0)
     for elapsed, finished in ((9.0, False), (10.4, False), (10.6, True)):
         step = execution.step(START + elapsed, state(START + elapsed))
         assert (step.phase, step.finished) == ("open", finished)
@@ -148,8 +148,8 @@ def test_a_hand_that_moves_on_without_handle_or_door_stops_it() -> None:
 
 def test_the_handle_may_spring_back_when_the_door_is_ajar_but_nothing_counts_before() -> None:
     execution = Execution(PLAN, BEGIN, SETTINGS)
-    for elapsed, changes in ((9.5, {"handle": 0.0}), (3.0, {"handle": -0.9, "hinge": -1.0})):
-        execution.step(START + elapsed, state(START + elapsed)._replace(**changes))
+    execution.step(START + 3.0, state(START + 3.0)._replace(handle=-0.9, hinge=-1.0))
+    execution.step(START + 9.5, state(START + 9.5)._replace(handle=0.0))
 
 
 def test_states_that_are_old_are_compared_with_what_was_then() -> None:

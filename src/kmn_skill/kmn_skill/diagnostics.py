@@ -7,7 +7,7 @@ from collections import Counter
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-SUCCESS = "success"
+from kmn_skill.opening import SUCCESS
 
 
 class SkillStatistics:

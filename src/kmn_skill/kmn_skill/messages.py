@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,12 +17,14 @@ from std_msgs.msg import ColorRGBA, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
 
+from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.messages import MessageError
 from kmn_perception.rotation import quaternion_from_matrix
 from kmn_skill.door_motion import moved_cubes
 from kmn_skill.execution import Part
+from kmn_skill.opening import SUCCESS, Result
 from kmn_skill.perceived_door import Observation
 from kmn_skill.plan import Plan
 from kmn_skill.states import Sample
@@ -94,6 +97,21 @@ def trajectory_from_part(part: Part, names: Sequence[str]) -> JointTrajectory:
     ]
     return JointTrajectory(
         header=Header(stamp=stamp_of(part.start)), joint_names=list(names), points=points
+    )
+
+
+def result_message(result: Result) -> OpenDoor.Result:
+    """Make the message of a goal's result."""
+    report = result.report
+    return OpenDoor.Result(
+        success=result.outcome == SUCCESS,
+        reason=result.reason,
+        handle_angle=result.handle_angle,
+        door_angle=result.door_angle,
+        planning_time=report.planning_time if report else math.nan,
+        contact_error=report.contact_error if report else math.nan,
+        clearance=report.clearance if report else math.nan,
+        attempts=result.attempts,
     )
 
 

@@ -22,12 +22,13 @@ from kmn_skill.errors import (
 )
 from kmn_skill.execution import Execution, ExecutionSettings, Part
 from kmn_skill.perceived_door import PerceivedDoor, when_closed
-from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
+from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planner import Planner
 from kmn_skill.states import StateWatch, WorldState
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
 WAIT, PLAN = "wait", "plan"  # phases before those of the plan
+SUCCESS = "success"  # outcome of a goal that was reached
 
 
 class Goal(NamedTuple):
@@ -43,17 +44,23 @@ class Result(NamedTuple):
     Attributes
     ----------
     outcome
-        ``success``, ``cancelled``, or a short key of what went wrong.
+        `SUCCESS`, or a short key of what went wrong.
     reason
         Why not, for people to read; empty on success.
     handle_angle, door_angle
         Largest handle angle reached, and the door angle in the end, radians.
+    report
+        What the check of the last plan found, if there was one.
+    attempts
+        Plans that were begun.
     """
 
     outcome: str
     reason: str
     handle_angle: float
     door_angle: float
+    report: PlanReport | None
+    attempts: int
 
 
 class Feedback(NamedTuple):
@@ -139,6 +146,8 @@ class DoorOpening:
         self._cancelled, self._feedback = cancelled, feedback
         self._breaks = watch.breaks
         self._handle = self._hinge = math.nan
+        self._plan_report: PlanReport | None = None
+        self._attempts = 0
 
     def run(self, goal: Goal) -> Result:
         """Open the door; in the end the robot stands still, whatever happened."""
@@ -147,11 +156,14 @@ class DoorOpening:
             self._open(goal)
         except SkillError as error:
             self._commands.hold()
-            return Result(error.reason, str(error), self._handle, self._hinge)
+            return self._result(error.reason, str(error))
         except Exception:
             self._commands.hold()
             raise
-        return Result("success", "", self._handle, self._hinge)
+        return self._result(SUCCESS, "")
+
+    def _result(self, outcome: str, reason: str) -> Result:
+        return Result(outcome, reason, self._handle, self._hinge, self._plan_report, self._attempts)
 
     def _check(self, goal: Goal) -> None:
         """Raise if the door's joints cannot have the goal's angles."""
@@ -183,20 +195,21 @@ class DoorOpening:
         """Return the parameters (n + m,) of the door when closed."""
         deadline = time.monotonic() + self._settings.door_timeout
         while True:
-            state = self._state()
-            self._report(WAIT, 0.0, state)
+            self._breaks = self._watch.breaks  # in which world it begins does not matter
             try:
+                state = self._state()
+                self._report(WAIT, 0.0, state)
                 seen = self._door.values(self._commands.now())
-            except DoorError:
+                return when_closed(self._model, seen, state.hinge)
+            except (StatesError, DoorError):
                 if time.monotonic() > deadline:
                     raise
-            else:
-                return when_closed(self._model, seen, state.hinge)
             time.sleep(POLL_PERIOD)
 
     def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:
         state = self._state()
         self._report(PLAN, 0.0, state)
+        self._attempts += 1
         theta, gamma = self._model.split(values)
         request = PlanRequest(
             theta=theta,
@@ -212,6 +225,7 @@ class DoorOpening:
             raise CancelledError("cancelled", "the goal was cancelled") from error
         except PlanningFailed as error:
             raise SkillError("no_plan", f"there is no plan: {error}") from error
+        self._plan_report = plan.report
         self._commands.show(plan, values)
         return plan
 

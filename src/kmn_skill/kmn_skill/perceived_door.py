@@ -177,6 +177,12 @@ class PerceivedDoor:
                 raise
             self._kept.append(observation)
 
+    def forget(self) -> None:
+        """Forget all observations, as of another world."""
+        with self._lock:
+            self._kept.clear()
+            self._refused = None
+
     def values(self, now: float) -> NDArray[np.float64]:
         """Return the mean parameters (n + m,) of the frames that agree.
 

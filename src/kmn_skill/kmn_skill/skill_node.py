@@ -30,11 +30,11 @@ from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.messages import MessageError
 from kmn_skill import messages
-from kmn_skill.diagnostics import SUCCESS, SkillStatistics
+from kmn_skill.diagnostics import SkillStatistics
 from kmn_skill.errors import DoorError
 from kmn_skill.execution import Part
 from kmn_skill.node_parameters import NodeSettings, declare_parameters, read_parameters
-from kmn_skill.opening import DoorOpening, Feedback, Goal, Result
+from kmn_skill.opening import SUCCESS, DoorOpening, Feedback, Goal, Result
 from kmn_skill.perceived_door import PerceivedDoor
 from kmn_skill.plan import Plan
 from kmn_skill.planner import Planner
@@ -159,6 +159,7 @@ class SkillNode(Node):
         breaks = self._watch.breaks
         self._watch.put(topic, sample)
         if self._watch.breaks != breaks:
+            self._door.forget()
             self._warn("break", f"another world: {self._watch.last_break}")
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
@@ -187,12 +188,7 @@ class SkillNode(Node):
             self._finish(goal_handle, result)
         finally:
             self._idle.set()
-        return OpenDoor.Result(
-            success=result.outcome == SUCCESS,
-            reason=result.reason,
-            handle_angle=result.handle_angle,
-            door_angle=result.door_angle,
-        )
+        return messages.result_message(result)
 
     def _open(self, goal_handle: ServerGoalHandle, goal: Goal) -> Result:
         settings = self._settings
@@ -211,7 +207,7 @@ class SkillNode(Node):
             return opening.run(goal)
         except Exception as error:  # a node never dies of a goal
             self.get_logger().error(traceback.format_exc())
-            return Result("internal_error", repr(error), math.nan, math.nan)
+            return Result("internal_error", repr(error), math.nan, math.nan, None, 0)
 
     def _finish(self, goal_handle: ServerGoalHandle, result: Result) -> None:
         self._statistics.finish(result.outcome, result.reason)

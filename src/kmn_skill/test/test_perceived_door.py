@@ -90,6 +90,12 @@ def test_a_clock_that_was_set_back_is_another_world() -> None:
     assert reason(door(seen(10.1), seen(10.2), seen(10.3), seen(0.1), seen(0.2))) == "few_frames"
 
 
+def test_what_is_forgotten_must_be_seen_anew() -> None:
+    perceived = door(seen(0.1), seen(0.2), seen(0.3))
+    perceived.forget()
+    assert reason(perceived) == "none"
+
+
 BAD = {
     "model": {"model": "box_a"},
     "status": {"problem": "TOO_FEW_POINTS: 3 points"},

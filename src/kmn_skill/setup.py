@@ -29,6 +29,8 @@ setup(
     ],
     zip_safe=False,
     entry_points={
-        "console_scripts": [f"{name} = {PACKAGE}.executables:{name}" for name in ("skill_node",)],
+        "console_scripts": [
+            f"{name} = {PACKAGE}.executables:{name}" for name in ("skill_node", "evaluate", "demo")
+        ],
     },
 )

@@ -28,3 +28,5 @@ def _executable(module: str) -> Callable[[], int | None]:
 
 
 skill_node = _executable("start_skill_node")
+evaluate = _executable("evaluate")
+demo = _executable("demo")

@@ -43,9 +43,16 @@ class Graph:
 
     def start(self, make_node: Callable[..., Node], threads: int = 1, **options: Any) -> Any:
         """Make a node and spin it until the end of the test."""
+        return self._stack.enter_context(self.running(make_node, threads, **options))
+
+    @contextmanager
+    def running(
+        self, make_node: Callable[..., Node], threads: int = 1, **options: Any
+    ) -> Iterator[Any]:
+        """Make a node and spin it until the end of the context."""
         node = make_node(context=self.context, **options)
-        self._stack.enter_context(spinning(node, threads))
-        return node
+        with spinning(node, threads):
+            yield node
 
     @staticmethod
     def wait_for(find: Callable[[], Found | None]) -> Found:

@@ -153,7 +153,7 @@ class PerceivedDoor:
         self._model, self._frame, self.settings = model, frame, settings
         self._lock = threading.Lock()
         self._kept: deque[Observation] = deque(maxlen=MOST_FRAMES)
-        self._refused: DoorError | None = None
+        self._refused: DoorError | None = None  # the last one
 
     def add(self, observation: Observation) -> None:
         """Keep an observation; one that is not usable parts those before from those after.
@@ -168,7 +168,6 @@ class PerceivedDoor:
                 if observation.time == self._kept[-1].time:
                     return  # the same exposure once more
                 self._kept.clear()  # the clock was set back: another world
-            self._refused = None
             try:
                 self._check(observation)
             except DoorError as refused:
@@ -199,14 +198,14 @@ class PerceivedDoor:
         settings, model = self.settings, self._model
         with self._lock:
             kept, refused = list(self._kept)[-settings.frames :], self._refused
-        if refused is not None:
-            raise refused
         if not kept:
-            raise DoorError("none", "no morphing parameters came yet")
+            raise refused or DoorError("none", "no morphing parameters came yet")
         _check_age(now - kept[-1].time, settings.max_age)
         if len(kept) < settings.frames:
+            before = f"; before: {refused}" if refused else ""
             raise DoorError(
-                "few_frames", f"{len(kept)} usable frame(s) so far, expected {settings.frames}"
+                "few_frames",
+                f"{len(kept)} usable frame(s) in a row, expected {settings.frames}{before}",
             )
         quantities = np.array([grasp_quantities(model, each.values) for each in kept])
         spread = np.ptp(quantities, axis=0)

@@ -20,7 +20,8 @@ def main() -> int:
     """Run the executable ``skill_node``; being interrupted is its normal end."""
     # The handlers of rclpy would end all communication before the robot is told to hold.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
+        signal.signal(number, signal.default_int_handler)
     try:
         return _run()
     except KeyboardInterrupt:

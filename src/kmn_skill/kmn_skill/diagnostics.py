@@ -7,7 +7,7 @@ from collections import Counter
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from kmn_skill.opening import SUCCESS
+from kmn_skill.opening import SUCCESS, Result
 
 
 class SkillStatistics:
@@ -48,12 +48,13 @@ class SkillStatistics:
         with self._lock:
             self._phase = phase
 
-    def finish(self, outcome: str, reason: str) -> None:
+    def finish(self, result: Result) -> None:
         """Count the end of a goal."""
         with self._lock:
             self._phase = "idle"
-            self._outcomes[outcome] += 1
-            self._last = reason or outcome
+            self._outcomes[result.outcome] += 1
+            self._tracking_error = result.tracking_error
+            self._last = result.reason or result.outcome
 
     def report(self, name: str, door: str) -> list[DiagnosticStatus]:
         """Return the statuses.
@@ -72,6 +73,7 @@ class SkillStatistics:
                 **{f"goals_{key}": str(count) for key, count in sorted(self._outcomes.items())},
                 "plans": str(self._plans),
                 "planning_time_s": f"{self._planning_time:.2f}",
+                "tracking_error": f"{self._tracking_error:.2f}",  # in units of the tolerances
                 "last": self._last,
             }
             messages = {

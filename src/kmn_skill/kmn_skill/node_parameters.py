@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -15,6 +15,7 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_skill.execution import ExecutionSettings
 from kmn_skill.opening import OpeningSettings
 from kmn_skill.perceived_door import MOST_FRAMES, DoorSettings
+from kmn_skill.settings import SkillSettings
 from kmn_skill.states import StateSettings
 
 JOINTS = 2  # hinge and handle
@@ -36,15 +37,15 @@ class NodeSettings:
         Kinematic model of the door.
     world_frame
         Frame that the door must be given in.
-    planning_time
-        Seconds that a plan may take.
+    skill
+        Settings of the planner.
     door, states, execution, opening
         Settings of the four.
     """
 
     model: KinematicModel
     world_frame: str
-    planning_time: float
+    skill: SkillSettings
     door: DoorSettings
     states: StateSettings
     execution: ExecutionSettings
@@ -67,10 +68,12 @@ class NodeSettings:
             )
         if not values["world_frame"]:
             raise ParameterError("'world_frame' is empty")
+        skill = SkillSettings.load()
+        planner = skill.planner._replace(time_limit=values["planning_time"])
         return cls(
             model=model,
             world_frame=values["world_frame"],
-            planning_time=values["planning_time"],
+            skill=replace(skill, planner=planner),
             door=_pick(DoorSettings, values),
             states=_pick(StateSettings, values),
             execution=_pick(ExecutionSettings, values),

@@ -53,6 +53,8 @@ class Result(NamedTuple):
         What the check of the last plan found, if there was one.
     attempts
         Plans that were begun.
+    tracking_error
+        Largest one, in units of the tolerances.
     """
 
     outcome: str
@@ -61,6 +63,7 @@ class Result(NamedTuple):
     door_angle: float
     report: PlanReport | None
     attempts: int
+    tracking_error: float
 
 
 class Feedback(NamedTuple):
@@ -148,6 +151,7 @@ class DoorOpening:
         self._handle = self._hinge = math.nan
         self._plan_report: PlanReport | None = None
         self._attempts = 0
+        self._tracking_error = 0.0
 
     def run(self, goal: Goal) -> Result:
         """Open the door; in the end the robot stands still, whatever happened."""
@@ -163,7 +167,15 @@ class DoorOpening:
         return self._result(SUCCESS, "")
 
     def _result(self, outcome: str, reason: str) -> Result:
-        return Result(outcome, reason, self._handle, self._hinge, self._plan_report, self._attempts)
+        return Result(
+            outcome,
+            reason,
+            self._handle,
+            self._hinge,
+            self._plan_report,
+            self._attempts,
+            self._tracking_error,
+        )
 
     def _check(self, goal: Goal) -> None:
         """Raise if the door's joints cannot have the goal's angles."""
@@ -236,6 +248,7 @@ class DoorOpening:
         while not finished:
             state = self._state()
             part, phase, progress, finished = execution.step(self._commands.now(), state)
+            self._tracking_error = max(self._tracking_error, execution.tracking_error)
             if part is not None:
                 self._commands.send(part)
             self._report(phase, progress, state)

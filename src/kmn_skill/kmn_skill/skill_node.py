@@ -7,6 +7,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -69,8 +70,8 @@ class SkillNode(Node):
         }
         self._door = PerceivedDoor(settings.model, settings.world_frame, settings.door)
         self._watch = StateWatch(settings.states, robot_joints)
-        self._planner = Planner(settings.planning_time)
-        self._planner.__enter__()
+        self._ending = ExitStack()
+        self._planner = self._ending.enter_context(Planner(settings.skill))
         self._statistics = SkillStatistics()
         self._warned: dict[str, float] = {}
         self._lock, self._idle = threading.Lock(), threading.Event()
@@ -85,7 +86,7 @@ class SkillNode(Node):
         """Let the robot hold, and end the planner and the node."""
         self._closing = True
         self._idle.wait()
-        self._planner.close()
+        self._ending.close()
         super().destroy_node()
 
     def now(self) -> float:
@@ -207,10 +208,10 @@ class SkillNode(Node):
             return opening.run(goal)
         except Exception as error:  # a node never dies of a goal
             self.get_logger().error(traceback.format_exc())
-            return Result("internal_error", repr(error), math.nan, math.nan, None, 0)
+            return Result("internal_error", repr(error), math.nan, math.nan, None, 0, math.nan)
 
     def _finish(self, goal_handle: ServerGoalHandle, result: Result) -> None:
-        self._statistics.finish(result.outcome, result.reason)
+        self._statistics.finish(result)
         if result.outcome == SUCCESS:
             self.get_logger().info(f"the door is open by {result.door_angle:.2f} rad")
             goal_handle.succeed()

@@ -11,11 +11,13 @@ from PIL import Image
 
 from kmn_perception.camera import Camera, look_at
 from kmn_sim.scenario import Scenario
+from kmn_sim.settings import DoorSettings
 from kmn_sim.simulation import Simulation
 
 FORMATS = (".gif", ".mp4")
 FOCAL = 0.8  # focal length in widths of the picture
-DOOR_VIEW = (-2.6, 2.4, 2.0), (-0.5, 0.0, 0.9)  # position, and what is looked at, from the door
+DOOR_VIEW = 4.0, -1.5, 2.2  # to the left of and along the way from robot to door, and up
+DOOR_TARGET = 0.53, 0.9  # part of that way, and height
 BOX_VIEW = (1.6, -2.3, 1.3), (-0.1, -0.6, 0.0)  # the same in the world; metres
 
 
@@ -79,4 +81,10 @@ def _view(scenario: Scenario) -> NDArray[np.float64]:
     """Return the pose (4, 4) of the camera that shows what is done."""
     if not scenario.is_door:
         return look_at(*BOX_VIEW)
-    return scenario.model.transformation.matrix(scenario.theta) @ look_at(*DOOR_VIEW)
+    start = np.array(DoorSettings.load().robot[:2])
+    way = scenario.model.transformation.matrix(scenario.theta)[:2, 3] - start
+    along = way / np.linalg.norm(way)
+    left = np.array([-along[1], along[0]])
+    target = start + DOOR_TARGET[0] * way
+    position = target + DOOR_VIEW[0] * left + DOOR_VIEW[1] * along
+    return look_at((*position, DOOR_VIEW[2]), (*target, DOOR_TARGET[1]))

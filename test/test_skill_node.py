@@ -1,6 +1,7 @@
 """Whatever goes wrong, skill_node says what, holds the robot, and opens the next door.
 
-The simulator, perception and skill are real nodes, in one process, in simulated time.
+The simulator, perception and skill are real nodes, in one process, in simulated time. To open a
+door takes some time, so that several cases share the opening that shows that nothing is broken.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ from kmn_skill.skill_node import SkillNode  # noqa: E402
 MODEL = KinematicModel.load("door")
 SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second
+CAMERA_RATE = 0.5  # frames a simulated second
+PATIENT = {"frames": 2, "max_age": 5.0, "door_timeout": 10.0}  # with so slow a camera
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
 SIMULATED_TIME = Parameter("use_sim_time", value=True)
 
@@ -98,7 +101,7 @@ class System(Node):
             Parameter("publish_clock", value=True),
             Parameter("placement", value="random"),
             Parameter("seed", value=SEED),
-            Parameter("camera_rate", value=1.0),
+            Parameter("camera_rate", value=CAMERA_RATE),
         ]
         self._simulator.enter_context(self.graph.running(SimNode, parameter_overrides=overrides))
         self.joints.clear()
@@ -181,7 +184,8 @@ def system(graph: Any) -> Iterator[System]:
     made.start_simulator()
     reliable = Parameter("reliability", value="reliable")
     graph.start(MorphNode, parameter_overrides=[SIMULATED_TIME, reliable])
-    graph.start(SkillNode, threads=3, parameter_overrides=[SIMULATED_TIME])
+    patient = [Parameter(name, value=value) for name, value in PATIENT.items()]
+    graph.start(SkillNode, threads=3, parameter_overrides=[SIMULATED_TIME, *patient])
     assert made.action.wait_for_server(30.0)
     made.graph.wait_for(lambda: made.perceived)
     yield made
@@ -226,7 +230,6 @@ def test_a_second_goal_is_rejected_and_a_cancelled_one_holds_the_robot(system: S
     assert "cancelled" in result.reason
     system.assert_it_holds()
     assert int(system.report()["goals_rejected"]) == 1
-    system.assert_it_opens()
 
 
 def spoilt(good: MorphingParameters, **changes: Any) -> MorphingParameters:
@@ -248,7 +251,7 @@ BAD: dict[str, Callable[[MorphingParameters], MorphingParameters]] = {
 def test_bad_parameters_of_the_door_get_a_clear_result(system: System) -> None:
     system.start_anew()
     good = system.graph.wait_for(lambda: system.perceived)[-1]
-    assert system.set("sim_node", camera_rate=0.2).successful
+    assert system.set("sim_node", camera_rate=0.1).successful
     try:
         for text, spoil in BAD.items():
             good.header.stamp.nanosec = (good.header.stamp.nanosec + 1) % 10**9
@@ -260,8 +263,8 @@ def test_bad_parameters_of_the_door_get_a_clear_result(system: System) -> None:
         system.parameters.publish(good)
         assert "the newest morphing parameters are" in system.fail()
     finally:
-        assert system.set("skill_node", door_timeout=5.0, max_age=2.0).successful
-        assert system.set("sim_node", camera_rate=1.0).successful
+        assert system.set("skill_node", **PATIENT).successful
+        assert system.set("sim_node", camera_rate=CAMERA_RATE).successful
     system.assert_it_holds()
 
 
@@ -283,9 +286,14 @@ def test_a_hand_that_another_one_opens_grasps_again(system: System) -> None:
     system.wait_for_phase("press")
     let_go = JointTrajectoryPoint(positions=[0.5])
     let_go.time_from_start.nanosec = 10**8
-    system.trajectory.publish(
-        JointTrajectory(joint_names=["l_gripper_l_finger_joint"], points=[let_go])
-    )
+    message = JointTrajectory(joint_names=["l_gripper_l_finger_joint"], points=[let_go])
+    system.feedback.clear()
+
+    def plans_anew() -> bool:
+        system.trajectory.publish(message)
+        return any(feedback.phase == "plan" for feedback in system.feedback)
+
+    system.graph.wait_for(plans_anew)
     _, result = system.result(handle)
     assert result.reason == ""
     assert result.success
@@ -296,7 +304,7 @@ def test_a_hand_that_another_one_opens_grasps_again(system: System) -> None:
 def test_a_simulator_that_is_reset_half_way_ends_the_goal(system: System) -> None:
     system.start_anew()
     handle = system.send()
-    system.wait_for_phase("grasp")
+    system.wait_for_phase("reach", 0.2)
     system.wait(system.reset.call_async(Trigger.Request()))
     status, result = system.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)
@@ -307,7 +315,7 @@ def test_a_simulator_that_is_reset_half_way_ends_the_goal(system: System) -> Non
 def test_a_simulator_that_dies_half_way_ends_the_goal_and_may_come_again(system: System) -> None:
     system.start_anew()
     handle = system.send()
-    system.wait_for_phase("press")
+    system.wait_for_phase("reach", 0.2)
     system.stop_simulator()
     status, result = system.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)

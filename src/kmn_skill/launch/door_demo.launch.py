@@ -15,7 +15,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
 from launch.substitutions import Command, LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import Node, SetParameter
 from launch_ros.parameter_descriptions import ParameterValue
 
 from kmn_perception.camera import Camera
@@ -41,7 +41,13 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=default, description=text)
                 for name, (default, text) in ARGUMENTS.items()
             ),
-            _node("kmn_sim", "sim_node", parameters=[{"placement": "random", **chosen}]),
+            # Simulated time: the simulation may be slower than the system's.
+            SetParameter("use_sim_time", True),
+            _node(
+                "kmn_sim",
+                "sim_node",
+                parameters=[{"placement": "random", "publish_clock": True, **chosen}],
+            ),
             _node("kmn_perception", "morph_node"),
             _node("kmn_skill", "skill_node"),
             _node("tf2_ros", "static_transform_publisher", arguments=_camera_transform()),

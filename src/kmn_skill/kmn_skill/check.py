@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill.clearance import Box, Surface, clearance
-from kmn_skill.plan import Plan, PlanReport, PlanRequest
+from kmn_skill.clearance import Surface, clearance
+from kmn_skill.plan import Phase, Plan, PlanReport, PlanRequest
 from kmn_skill.robot import Robot
 from kmn_skill.settings import SkillSettings
 from kmn_skill.timing import peaks
@@ -23,7 +23,7 @@ MOVING = ("forearm", "wrist", "palm", *HOLDING)  # of the left arm, that may tou
 SLACK = 1e-6  # of limits
 
 
-class PlanRejected(Exception):
+class PlanRejected(Exception):  # noqa: N818
     """A plan does not fulfil what it must; the text says what."""
 
 
@@ -50,14 +50,15 @@ def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanR
     _check_start(plan, request, limits.start)
     _check_motion(plan, robot, world)
     handle, door = _check_targets(plan, request, limits.angle)
-    path, grasped = _sampled(plan, world, limits.samples)
-    contact = _contact_error(path[grasped:], world)
+    grasp = next(phase for phase in plan.phases if phase.name == "grasp")
+    path = _sampled(plan, grasp, world, limits.samples)
+    contact = _contact_error(path[grasp.last * limits.samples :], world)
     if contact > limits.contact:
         raise PlanRejected(
             f"gripper and handle are {1e3 * contact:.1f} mm apart, allowed are "
             f"{1e3 * limits.contact:g} mm"
         )
-    least, names = _clearance(path, grasped, world)
+    least, names = _clearance(path, grasp.first * limits.samples, world)
     if least < limits.clearance:
         raise PlanRejected(
             f"{names[0]} comes within {1e3 * least:.0f} mm of {names[1]}, expected at least "
@@ -122,26 +123,22 @@ def _check_targets(plan: Plan, request: PlanRequest, tolerance: float) -> tuple[
     return handle, door
 
 
-def _sampled(plan: Plan, world: World, samples: int) -> tuple[NDArray[np.float64], int]:
-    """Return the configurations (N, 13) on the way, and the first with the handle in the hand.
+def _sampled(plan: Plan, grasp: Phase, world: World, samples: int) -> NDArray[np.float64]:
+    """Return the configurations (N, 13) on the way.
 
     The fingers squeeze, but stand where they touch.
     """
-    grasp = next(phase for phase in plan.phases if phase.name == "grasp")
     count = len(plan.times) - 1
     at = np.interp(np.arange(count * samples + 1) / samples, np.arange(count + 1), plan.times)
     robot = hermite(plan.positions, plan.velocities, plan.times, at)
     rates = np.gradient(plan.door, plan.times, axis=0)
     rates[~plan.velocities.any(axis=1)] = 0.0  # where the robot rests
-    door = hermite(plan.door, rates, plan.times, at)
-    path = np.hstack([robot, door])
-    grasped = grasp.last * samples
-    if path[grasped:, 10].max() > world.touching:
+    path = np.hstack([robot, hermite(plan.door, rates, plan.times, at)])
+    if path[grasp.last * samples :, 10].max() > world.touching:
         raise PlanRejected("the gripper does not close about the handle")
-    path[grasp.first * samples :, 10] = np.maximum(
-        path[grasp.first * samples :, 10], world.touching
-    )
-    return path, grasped
+    closing = path[grasp.first * samples :, 10]
+    np.maximum(closing, world.touching, out=closing)
+    return path
 
 
 def _contact_error(path: NDArray[np.float64], world: World) -> float:
@@ -156,14 +153,20 @@ def _surfaces() -> dict[str, Surface]:
 
 
 def _clearance(
-    path: NDArray[np.float64], grasped: int, world: World
+    path: NDArray[np.float64], closing: int, world: World
 ) -> tuple[float, tuple[str, str]]:
-    """Return the least distance (m) between what shall not touch, and the names of the two."""
+    """Return the least distance (m) between what shall not touch, and the names of the two.
+
+    Parameters
+    ----------
+    closing
+        Configuration from which on the gripper closes about the handle.
+    """
     own = boxes(Robot.load())
     around = world.door_boxes(SkillSettings.load().check.stem)
     around.update({name: own[name] for name in OBSTACLES})
     parts = _surfaces()
-    frames = sorted({item.frame for item in (*around.values(), *parts.values())})
+    frames = sorted({box.frame for box in around.values()} | {p.frame for p in parts.values()})
     poses = dict(zip(frames, world.poses(path, frames).transpose(1, 0, 2, 3), strict=True))
     least, names = np.inf, ("", "")
     for body, part in parts.items():
@@ -171,7 +174,7 @@ def _clearance(
             if other in OBSTACLES and body not in MOVING:
                 continue
             held = body in HOLDING and other in ("handle", "stem")
-            until = grasped - 1 if held else len(path)
+            until = closing + 1 if held else len(path)
             distance = clearance(part, poses[part.frame][:until], box, poses[box.frame][:until])
             if distance < least:
                 least, names = distance, (body, other)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 PHASES = ("reach", "grasp", "press", "open")
 
 
-class PlanningFailed(Exception):
+class PlanningFailed(Exception):  # noqa: N818
     """No plan was found that passes the check; the text says why."""
 
 
-class PlanningCancelled(Exception):
+class PlanningCancelled(Exception):  # noqa: N818
     """The caller does not want the plan any more."""
 
 
@@ -36,8 +36,6 @@ class PlanRequest:
     door_angle
         Angle to which the door is opened, radians: negative towards a robot before the door
         (pull), positive away from it (push).
-    kind
-        ``open``, the policy with transfer, or ``prototype``, the prototype's trajectory as it is.
     """
 
     theta: NDArray[np.float64]
@@ -46,7 +44,6 @@ class PlanRequest:
     door_start: NDArray[np.float64]
     handle_angle: float
     door_angle: float
-    kind: str = "open"
 
 
 class Phase(NamedTuple):

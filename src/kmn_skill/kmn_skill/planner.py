@@ -14,8 +14,6 @@ from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
 from kmn_skill.planning_process import serve
 from kmn_skill.settings import SkillSettings
 
-__all__ = ["Planner", "PlanRequest", "PlanningCancelled", "PlanningFailed"]
-
 POLL_PERIOD = 0.02  # seconds
 STOP_TIMEOUT = 2.0  # seconds for the process to end
 
@@ -64,8 +62,9 @@ class Planner:
         """
         begin = time.monotonic()
         reasons = []
-        guesses = prototypes.load()[prototypes.direction(request.door_angle)]
-        for guess in guesses[: 1 if request.kind == "prototype" else None]:
+        for guess in prototypes.guesses(
+            request.door_angle, self._settings.attempts, self._settings.spread
+        ):
             left = self._settings.time_limit - (time.monotonic() - begin)
             if left <= 0.0:
                 reasons.append(f"the {self._settings.time_limit:g} s are over")

@@ -74,6 +74,10 @@ class PlannerSettings(NamedTuple):
         Configurations a phase of the first and of the final solution.
     near
         Pairs that are further apart in the first solution are left out in the final one, metres.
+    attempts, spread
+        First guesses, and the standard deviation (m and rad) by which they vary.
+    violation
+        Of the constraints, above which the first solution is given up.
     time_limit, attempt_limit
         Seconds for a plan, and for one first guess.
     coarse_options, fine_options
@@ -83,6 +87,9 @@ class PlannerSettings(NamedTuple):
     coarse: int
     fine: int
     near: float
+    attempts: int
+    spread: float
+    violation: float
     time_limit: float
     attempt_limit: float
     coarse_options: dict[str, float]
@@ -185,12 +192,16 @@ def _names(section: Section, key: str) -> tuple[str, ...]:
 
 
 def _planner(section: Section, solver: Section) -> PlannerSettings:
-    section.allow(("coarse", "fine", "near", "time_limit", "attempt_limit"))
+    names = set(PlannerSettings._fields) - {"coarse_options", "fine_options"}
+    section.allow(sorted(names))
     solver.allow(("coarse", "fine"))
     return PlannerSettings(
         coarse=section.whole_number("coarse", 3, 100),
         fine=section.whole_number("fine", 3, 1000),
         near=section.number("near", 0.0),
+        attempts=section.whole_number("attempts", 1, 100),
+        spread=section.number("spread", 0.0),
+        violation=section.number("violation", 0.0),
         time_limit=section.number("time_limit", 0.0),
         attempt_limit=section.number("attempt_limit", 0.0),
         coarse_options=_options(solver.section("coarse")),

@@ -11,7 +11,7 @@ import robotic as ry
 from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill.check import check
+from kmn_skill.check import PlanRejected, check
 from kmn_skill.plan import Plan, PlanRequest
 from kmn_skill.policy import Policy, near_pairs, pairs
 from kmn_skill.robot import Robot
@@ -26,12 +26,12 @@ class Solver:
 
     def __init__(self) -> None:
         self._settings, self._robot = SkillSettings.load(), Robot.load()
-        self._model = KinematicModel.load("door")
-        self.world(np.zeros(len(self._model.theta)), np.zeros(len(self._model.gamma)))
+        self.model = KinematicModel.load("door")
+        self.world(np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma)))
 
     def world(self, theta: NDArray[np.float64], gamma: NDArray[np.float64]) -> World:
         """Return the world of the door m(theta, gamma)."""
-        return World(self._model, theta, gamma, self._robot, self._settings.grasp)
+        return World(self.model, theta, gamma, self._robot, self._settings.grasp)
 
     def plan(self, request: PlanRequest, guess: NDArray[np.float64], name: str) -> Plan:
         """Return a plan that passes the check.
@@ -39,7 +39,7 @@ class Solver:
         Parameters
         ----------
         guess
-            (T, 13) solution for a prototype, to be transferred.
+            (T + 1, 13) solution for a prototype, to be transferred.
         name
             Of the guess.
 
@@ -49,10 +49,7 @@ class Solver:
             If the solution does not pass.
         """
         world = self.world(request.theta, request.gamma)
-        if request.kind == "prototype":
-            path = refine(guess, self._start(request), self._settings.planner.fine)
-        else:
-            path = self._solve(world, request, transfer(guess, self._model, request))
+        path = self._solve(world, request, transfer(guess, self.model, request))
         plan = timed_plan(path, request, self._robot, self._settings.timing)
         plan = replace(plan, report=replace(plan.report, seed_used=name))
         return replace(plan, report=check(plan, request, world))
@@ -60,11 +57,20 @@ class Solver:
     def coarse(
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the solution (T, 13) with few configurations, from a guess of as many."""
+        """Return the solution (T, 13) with few configurations, from a guess of as many.
+
+        Raises
+        ------
+        PlanRejected
+            If it is none.
+        """
         settings = self._settings
         slices, around = settings.planner.coarse, pairs(settings.policy, world)
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        return optimise(policy.problem, guess, settings.planner.coarse_options)
+        path, violation = optimise(policy.problem, guess, settings.planner.coarse_options)
+        if violation > settings.planner.violation:
+            raise PlanRejected("no motion was found that fulfils all constraints")
+        return path
 
     def _solve(
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
@@ -76,7 +82,7 @@ class Solver:
         slices = settings.planner.fine
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
         finer = refine(path, self._start(request), slices)
-        return optimise(policy.problem, finer, settings.planner.fine_options)
+        return optimise(policy.problem, finer, settings.planner.fine_options)[0]
 
     def _start(self, request: PlanRequest) -> NDArray[np.float64]:
         return np.concatenate([request.start, request.door_start])
@@ -84,10 +90,10 @@ class Solver:
 
 def optimise(
     problem: Any, guess: NDArray[np.float64], options: Mapping[str, float]
-) -> NDArray[np.float64]:
-    """Return where the solver ends (T, 13), which may be no solution."""
+) -> tuple[NDArray[np.float64], float]:
+    """Return where the solver ends (T, 13), and how much it violates the constraints."""
     problem.initWithPath(guess)
     solver = ry.NLP_Solver(problem.nlp(), verbose=0)
     solver.setOptions(verbose=0, **options)
-    solver.solve()
-    return np.array(problem.getPath())
+    result = solver.solve()
+    return np.array(problem.getPath()), float(result.eq + result.ineq)

@@ -56,7 +56,7 @@ def _paced(
     limits
         (J, 2) largest velocities and accelerations.
     """
-    rates = np.gradient(nodes, axis=0)
+    rates: NDArray[np.float64] = np.gradient(nodes, axis=0)
     rates[[0, -1]] = 0.0
     fastest, sharpest = peaks(nodes, rates, np.ones(len(nodes) - 1))
     step = max(
@@ -64,7 +64,7 @@ def _paced(
         float((fastest / limits[:, 0]).max()),
         float(np.sqrt(sharpest / limits[:, 1]).max()),
     )
-    return step * np.arange(len(nodes)), rates / step
+    return step * np.arange(len(nodes), dtype=np.float64), rates / step
 
 
 def peaks(

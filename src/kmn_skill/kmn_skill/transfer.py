@@ -15,25 +15,33 @@ from kmn_skill.policy import PHASES
 def transfer(
     path: NDArray[np.float64], model: KinematicModel, request: PlanRequest
 ) -> NDArray[np.float64]:
-    """Return a path for a door, made from the prototype's.
+    """Return a path (T, 13) for a door, made from the prototype's.
 
-    The base is moved by T_theta. Where the door shall turn by other angles than the prototype, or
-    is ajar, the base also turns with it about its hinge.
+    The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
+    shall turn by other angles than the prototype, or is ajar, the base also turns with it about
+    its hinge. What then parts the path from the present state fades out up to the pre-grasp pose.
 
     Parameters
     ----------
     path
-        (T, 13) of the prototype.
+        (T + 1, 13) of the prototype, with the start.
     """
     guess = path.copy()
     guess[:, 11] = _stretched(path[:, 11], request.door_start[0], request.door_angle)
     guess[:, 12] = _stretched(path[:, 12], request.door_start[1], request.handle_angle)
+    prototype = np.zeros_like(request.gamma)
     pose = model.transformation.matrix(request.theta)
-    hinge = model.joints[0]
+    hinge, handle = model.joints
+    shift = np.eye(4)
+    shift[:3, 3] = handle.origin(request.gamma) - handle.origin(prototype)
     for before, after in zip(path, guess, strict=True):
-        motion = pose @ turn(hinge, request.gamma, after[11] - before[11])
-        after[:3] = move_base(before[:3], motion)
-    return guess
+        closing = np.linalg.inv(turn(hinge, prototype, before[11]))
+        opening = turn(hinge, request.gamma, after[11])
+        after[:3] = move_base(before[:3], pose @ opening @ shift @ closing)
+    phase = (len(path) - 1) // PHASES
+    fading = np.clip(1.0 - np.arange(len(path)) / phase, 0.0, 1.0)[:, None]
+    guess[:, :11] += fading**2 * (3.0 - 2.0 * fading) * (request.start - guess[0, :11])
+    return guess[1:]
 
 
 def move_base(base: NDArray[np.float64], motion: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,7 +110,8 @@ def _stretched(angles: NDArray[np.float64], start: float, end: float) -> NDArray
 
 def _resampled(nodes: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return ``count`` configurations on the curve from rest to rest through nodes (M, D)."""
-    velocities = np.gradient(nodes, axis=0)
+    velocities: NDArray[np.float64] = np.gradient(nodes, axis=0)
     velocities[[0, -1]] = 0.0
     times = np.arange(len(nodes), dtype=np.float64)
-    return hermite(nodes, velocities, times, np.linspace(0.0, len(nodes) - 1.0, count))
+    at = np.linspace(0.0, len(nodes) - 1.0, count, dtype=np.float64)
+    return hermite(nodes, velocities, times, at)

@@ -241,7 +241,7 @@ def _add_door(
     pose = model.transformation.matrix(theta)
     _add(configuration, OBJECT, "world", pose[:3, 3], pose[:3, :3])
     frames = {"world": OBJECT}
-    origins = {"world": np.zeros(3)}
+    origins: dict[str, NDArray[np.float64]] = {"world": np.zeros(3)}
     for joint in model.joints:
         origin, parent = joint.origin(gamma), frames[joint.parent]
         _add(configuration, f"{joint.name}_origin", parent, origin - origins[joint.parent])

@@ -164,16 +164,16 @@ class PerceivedDoor:
             If it is not usable.
         """
         with self._lock:
-            if self._kept and observation.time <= self._kept[-1].time:
-                if observation.time == self._kept[-1].time:
-                    return  # the same exposure once more
-                self._kept.clear()  # the clock was set back: another world
             try:
                 self._check(observation)
             except DoorError as refused:
                 self._kept.clear()
                 self._refused = refused
                 raise
+            if self._kept and observation.time == self._kept[-1].time:
+                return  # the same exposure once more
+            if self._kept and observation.time < self._kept[-1].time:
+                self._kept.clear()  # the clock was set back: another world
             self._kept.append(observation)
 
     def forget(self) -> None:

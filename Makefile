@@ -26,8 +26,15 @@ help:  ## list the targets
 .PHONY: build
 build: $(BUILT)  ## set up the environment and build all packages (4 minutes the first time)
 
+SEED := 0
+MODE := pull
+
 .PHONY: demo
-demo: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
+demo: build $(READY)simulation  ## let a simulated PR2 open a door that it sees (SEED=0 MODE=pull)
+	@./run kmn_skill demo --seed $(SEED) --mode $(MODE)
+
+.PHONY: demo-bag
+demo-bag: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
 	@./run kmn_perception demo_bag
 
 .PHONY: demo-bag

@@ -14,7 +14,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
@@ -36,11 +41,18 @@ class Graph:
     def __init__(self, context: Context, stack: ExitStack) -> None:
         self.context, self._stack = context, stack
 
-    def start(self, make_node: Callable[..., Node], **options: Any) -> Any:
+    def start(self, make_node: Callable[..., Node], threads: int = 1, **options: Any) -> Any:
         """Make a node and spin it until the end of the test."""
+        return self._stack.enter_context(self.running(make_node, threads, **options))
+
+    @contextmanager
+    def running(
+        self, make_node: Callable[..., Node], threads: int = 1, **options: Any
+    ) -> Iterator[Any]:
+        """Make a node and spin it until the end of the context."""
         node = make_node(context=self.context, **options)
-        self._stack.enter_context(spinning(node))
-        return node
+        with spinning(node, threads):
+            yield node
 
     @staticmethod
     def wait_for(find: Callable[[], Found | None]) -> Found:
@@ -137,9 +149,11 @@ class Client(Node):
 
 
 @contextmanager
-def spinning(node: Node) -> Iterator[None]:
-    """Spin a node in a thread, and destroy it at the end."""
-    executor = SingleThreadedExecutor(context=node.context)
+def spinning(node: Node, threads: int = 1) -> Iterator[None]:
+    """Spin a node in a thread or more, and destroy it at the end."""
+    executor: Executor = SingleThreadedExecutor(context=node.context)
+    if threads > 1:
+        executor = MultiThreadedExecutor(threads, context=node.context)
     executor.add_node(node)
 
     def spin() -> None:

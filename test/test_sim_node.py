@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -72,6 +74,11 @@ class SimClient(Node):
             parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
         )
         return self.call(self.setting, request).result
+
+    def now(self) -> float:
+        """Return the simulated time, seconds."""
+        self.clocks.clear()
+        return seconds(self.graph.wait_for(lambda: self.clocks)[-1].clock)
 
     def report(self) -> dict[str, str]:
         self.reports.clear()
@@ -240,6 +247,19 @@ def test_a_wrong_parameter_is_refused_with_the_reason(
     result = client.set(**values)
     assert not result.successful
     assert text in result.reason
+
+
+def test_parts_of_a_run_are_filmed(client: SimClient, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        film = tmp_path / f"{name}.mp4"
+        before = client.now()
+        assert client.set(record=str(film), record_rate=5.0).successful
+        start = client.now()
+        client.graph.wait_for(lambda start=start: client.now() > start + 1.0)
+        end = client.now()
+        assert client.set(record="").successful
+        pictures = cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_COUNT)
+        assert 5.0 * (end - start) - 1.0 <= pictures <= 5.0 * (client.now() - before) + 1.0
 
 
 def test_boxes_have_no_door_state(client: SimClient) -> None:

@@ -25,5 +25,5 @@ def test_every_parameter_stands_there_with_its_default() -> None:
 
 def test_every_executable_stands_there() -> None:
     rows = set(re.findall(r"^\| `(\w+)", PAGE, flags=re.MULTILINE))
-    assert {"sim_node", "snapshot", "check_perception", "benchmark"} <= rows
+    assert {"sim_node", "snapshot", "check_perception", "benchmark", "robot_description"} <= rows
     assert callable(executables.sim_node)

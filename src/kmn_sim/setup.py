@@ -21,7 +21,14 @@ setup(
     entry_points={
         "console_scripts": [
             f"{name} = {PACKAGE}.executables:{name}"
-            for name in ("sim_node", "snapshot", "check_perception", "check_noise", "benchmark")
+            for name in (
+                "sim_node",
+                "snapshot",
+                "check_perception",
+                "check_noise",
+                "benchmark",
+                "robot_description",
+            )
         ],
     },
 )

@@ -1,8 +1,16 @@
 """Installs kmn_skill."""
 
+from pathlib import Path
+
 from setuptools import find_packages, setup
 
 PACKAGE = "kmn_skill"
+
+
+def shared(folder: str) -> tuple[str, list[str]]:
+    """Return a (destination, files) pair that puts the files of `folder` into the share."""
+    return f"share/{PACKAGE}/{folder}", [str(file) for file in sorted(Path(folder).iterdir())]
+
 
 setup(
     name=PACKAGE,
@@ -16,6 +24,13 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
+        shared("launch"),
+        shared("rviz"),
     ],
     zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            f"{name} = {PACKAGE}.executables:{name}" for name in ("skill_node", "evaluate", "demo")
+        ],
+    },
 )

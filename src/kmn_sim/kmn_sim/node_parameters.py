@@ -26,6 +26,7 @@ ENCODINGS = ("32FC1", "16UC1")
 OPTIONS = ("stem", "frame", "wall", "floor", "table")
 WORLD = ("model", "placement", "values", "seed", "direction", *OPTIONS)
 SENSOR = ("model", "camera", "camera_mount", "noise", "seed")
+FILM = ("record", "record_rate")
 
 
 class ParameterError(ValueError):
@@ -180,6 +181,6 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
         read_only=True,
     ),
     "gui": _any("Show a window of the physics engine.", read_only=True),
-    "record": _any("File to write a film to, .gif or .mp4; empty: none.", read_only=True),
-    "record_rate": _real("Pictures of the film a simulated second.", 1.0, 60.0, read_only=True),
+    "record": _any("File to write a film to until it changes, .gif or .mp4; empty: none."),
+    "record_rate": _real("Pictures of the film a simulated second.", 1.0, 60.0),
 }

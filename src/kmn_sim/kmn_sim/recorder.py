@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from kmn_perception.camera import Camera, look_at
+from kmn_sim.scenario import Scenario
+from kmn_sim.settings import DoorSettings
 from kmn_sim.simulation import Simulation
 
 FORMATS = (".gif", ".mp4")
 FOCAL = 0.8  # focal length in widths of the picture
-VIEWS = {  # position, and what is looked at; metres
-    True: ((-4.6, -3.0, 2.2), (-1.5, 0.0, 0.9)),  # a door
-    False: ((1.6, -2.3, 1.3), (-0.1, -0.6, 0.0)),  # a box
-}
+DOOR_VIEW = 4.0, -1.5, 2.2  # to the left of and along the way from robot to door, and up
+DOOR_TARGET = 0.53, 0.9  # part of that way, and height
+BOX_VIEW = (1.6, -2.3, 1.3), (-0.1, -0.6, 0.0)  # the same in the world; metres
 
 
 class Recorder:
@@ -64,7 +65,6 @@ class Recorder:
 
 def snapshot(simulation: Simulation, width: int, height: int) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of robot and object, from beside them."""
-    position, target = VIEWS[simulation.scenario.is_door]
     camera = Camera(
         width,
         height,
@@ -72,6 +72,19 @@ def snapshot(simulation: Simulation, width: int, height: int) -> NDArray[np.uint
         FOCAL * width,
         (width - 1) / 2.0,
         (height - 1) / 2.0,
-        look_at(position, target),
+        _view(simulation.scenario),
     )
     return simulation.renderer.render(camera).colour
+
+
+def _view(scenario: Scenario) -> NDArray[np.float64]:
+    """Return the pose (4, 4) of the camera that shows what is done."""
+    if not scenario.is_door:
+        return look_at(*BOX_VIEW)
+    start = np.array(DoorSettings.load().robot[:2])
+    way = scenario.model.transformation.matrix(scenario.theta)[:2, 3] - start
+    along = way / np.linalg.norm(way)
+    left = np.array([-along[1], along[0]])
+    target = start + DOOR_TARGET[0] * way
+    position = target + DOOR_VIEW[0] * left + DOOR_VIEW[1] * along
+    return look_at((*position, DOOR_VIEW[2]), (*target, DOOR_TARGET[1]))

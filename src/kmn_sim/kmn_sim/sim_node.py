@@ -28,6 +28,7 @@ from kmn_sim import messages
 from kmn_sim.depth_camera import DepthCamera
 from kmn_sim.diagnostics import SimulationStatistics
 from kmn_sim.node_parameters import (
+    FILM,
     SENSOR,
     WORLD,
     NodeSettings,
@@ -74,10 +75,9 @@ class SimNode(Node):
         )
         self._camera_task = self._runner.every(1.0 / settings["camera_rate"], self._publish_camera)
         self._recorder: Recorder | None = None
-        if settings["record"]:
-            self._recorder = Recorder(Path(settings["record"]), settings["record_rate"])
-            self._runner.every(1.0 / settings["record_rate"], self._recorder.take)
+        self._film_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
         self._runner.start()
+        self._change_film(settings)
         self._renderer = renderer = self._runner.call(lambda simulation: simulation.renderer.name)
         if renderer != settings["renderer"]:
             self.get_logger().warning(
@@ -177,6 +177,23 @@ class SimNode(Node):
                 cloud_from_points(depth_to_points(depth, camera), header)
             )
 
+    def _take_picture(self, simulation: Simulation) -> None:
+        if self._recorder is not None:
+            self._recorder.take(simulation)
+
+    def _change_film(self, settings: NodeSettings) -> None:
+        """Write the film that is being made, if any, and begin the one that is asked for."""
+        file, rate = settings["record"], settings["record_rate"]
+        recorder = Recorder(Path(file), rate) if file else None
+
+        def exchange(simulation: Simulation) -> Recorder | None:
+            before, self._recorder = self._recorder, recorder
+            self._film_task.period = 1.0 / rate
+            return before
+
+        if (before := self._runner.call(exchange)) is not None:
+            before.close()
+
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
             self._runner.call(lambda simulation: self._accept(simulation, message))
@@ -219,6 +236,8 @@ class SimNode(Node):
             self._rebuild(settings)
         elif settings.differs(self._settings, SENSOR):
             self._depth_camera = self._make_camera(settings)
+        if settings.differs(self._settings, FILM):
+            self._change_film(settings)
         self._settings = settings
         self._runner.real_time_factor = settings["real_time_factor"]
         self._states_task.period = 1.0 / settings["joint_state_rate"]

@@ -1,0 +1,269 @@
+"""The node that opens doors: an action in, joint trajectories out."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+import traceback
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from kmn_msgs.action import OpenDoor
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.messages import MessageError
+from kmn_skill import messages
+from kmn_skill.diagnostics import SkillStatistics
+from kmn_skill.errors import DoorError
+from kmn_skill.execution import Part
+from kmn_skill.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_skill.opening import SUCCESS, DoorOpening, Feedback, Goal, Result
+from kmn_skill.perceived_door import PerceivedDoor
+from kmn_skill.plan import Plan
+from kmn_skill.planner import Planner
+from kmn_skill.robot import Robot
+from kmn_skill.states import StateWatch
+
+DIAGNOSTICS_PERIOD = 1.0  # seconds
+FEEDBACK_PERIOD = 0.1  # seconds
+WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
+QUEUE_DEPTH = 10
+
+
+class SkillNode(Node):
+    """Opens one door at a time, in a thread of its executor, which needs more than one.
+
+    Raises
+    ------
+    ParameterException, ParameterError
+        If a parameter is wrong.
+    OSError, ConfigurationError
+        If the model or a configuration cannot be loaded.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("skill_node", **options)
+        declare_parameters(self)
+        self._settings = settings = NodeSettings.check(read_parameters(self))
+        robot_joints = Robot.load().joint_names
+        self._joints = {
+            "joint_states": robot_joints,
+            "door_state": tuple(joint.name for joint in settings.model.joints),
+        }
+        self._door = PerceivedDoor(settings.model, settings.world_frame, settings.door)
+        self._watch = StateWatch(settings.states, robot_joints)
+        self._ending = ExitStack()
+        self._planner = self._ending.enter_context(Planner(settings.skill))
+        self._statistics = SkillStatistics()
+        self._warned: dict[str, float] = {}
+        self._lock, self._idle = threading.Lock(), threading.Event()
+        self._idle.set()
+        self._closing = False
+        self._fed_back, self._phase = 0.0, ""
+        self._connect()
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self.get_logger().info(f"opening doors of model '{settings.model.name}'")
+
+    def destroy_node(self) -> None:
+        """Let the robot hold, and end the planner and the node."""
+        self._closing = True
+        self._idle.wait()
+        self._ending.close()
+        super().destroy_node()
+
+    def now(self) -> float:
+        """Return the present time of the node's clock, seconds."""
+        return messages.seconds(self.get_clock().now().to_msg())
+
+    def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
+        """Publish a plan as markers."""
+        report, model = plan.report, self._settings.model
+        self._statistics.plan(report.planning_time)
+        self.get_logger().info(
+            f"plan of {report.duration:.1f} s found within {report.planning_time:.2f} s, "
+            f"clearance {report.clearance:.3f} m"
+        )
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.world_frame)
+        self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
+
+    def send(self, part: Part) -> None:
+        """Publish a part of a plan."""
+        joints = self._joints["joint_states"]
+        self._trajectory_publisher.publish(messages.trajectory_from_part(part, joints))
+
+    def hold(self) -> None:
+        """Let the robot hold where it is."""
+        self._trajectory_publisher.publish(JointTrajectory())
+
+    def tell(self, text: str) -> None:
+        """Log a warning."""
+        self.get_logger().warning(text)
+
+    def _connect(self) -> None:
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._trajectory_publisher = self.create_publisher(
+            JointTrajectory, "joint_trajectory", QUEUE_DEPTH
+        )
+        self._path_publisher = self.create_publisher(MarkerArray, "planned_path", latched)
+        self._diagnostics_publisher = self.create_publisher(
+            DiagnosticArray, "/diagnostics", QUEUE_DEPTH
+        )
+        group = MutuallyExclusiveCallbackGroup()
+        for topic in self._joints:
+            self.create_subscription(
+                JointState, topic, partial(self._on_state, topic), 1, callback_group=group
+            )
+        self.create_subscription(
+            MorphingParameters,
+            "morphing_parameters",
+            self._on_parameters_of_door,
+            QUEUE_DEPTH,
+            callback_group=group,
+        )
+        # A steady clock: reports go on when a simulated time stops or jumps.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady, callback_group=group)
+        self._server = ActionServer(
+            self,
+            OpenDoor,
+            "open_door",
+            self._on_open_door,
+            callback_group=ReentrantCallbackGroup(),
+            goal_callback=self._on_goal,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def _on_state(self, topic: str, message: JointState) -> None:
+        try:
+            sample = messages.sample_from_state(message, self._joints[topic])
+        except MessageError as error:
+            self._refuse(f"{topic}_{error.reason}", f"{topic} refused: {error}")
+            return
+        breaks = self._watch.breaks
+        self._watch.put(topic, sample)
+        if self._watch.breaks != breaks:
+            self._door.forget()
+            self._warn("break", f"another world: {self._watch.last_break}")
+
+    def _on_parameters_of_door(self, message: MorphingParameters) -> None:
+        try:
+            self._door.add(messages.observation_from_message(message))
+        except DoorError as error:
+            self._refuse(error.reason, f"morphing_parameters refused: {error}")
+        else:
+            self._statistics.use()
+
+    def _on_goal(self, request: OpenDoor.Goal) -> GoalResponse:
+        """Accept a goal if none runs; whether it can be reached is for its result to tell."""
+        with self._lock:
+            if self._idle.is_set() and not self._closing:
+                self._idle.clear()
+                return GoalResponse.ACCEPT
+        text = "goal rejected: another one runs, which must end or be cancelled first"
+        self._statistics.reject(text)
+        self._warn("rejected", text)
+        return GoalResponse.REJECT
+
+    def _on_open_door(self, goal_handle: ServerGoalHandle) -> OpenDoor.Result:
+        request = goal_handle.request
+        try:
+            result = self._open(goal_handle, Goal(request.handle_angle, request.door_angle))
+            self._finish(goal_handle, result)
+        finally:
+            self._idle.set()
+        return messages.result_message(result)
+
+    def _open(self, goal_handle: ServerGoalHandle, goal: Goal) -> Result:
+        settings = self._settings
+        opening = DoorOpening(
+            settings.model,
+            self._door,
+            self._watch,
+            self._planner,
+            self,
+            settings.opening,
+            settings.execution,
+            cancelled=lambda: self._closing or goal_handle.is_cancel_requested,
+            feedback=partial(self._feed_back, goal_handle),
+        )
+        try:
+            return opening.run(goal)
+        except Exception as error:  # a node never dies of a goal
+            self.get_logger().error(traceback.format_exc())
+            return Result("internal_error", repr(error), math.nan, math.nan, None, 0, math.nan)
+
+    def _finish(self, goal_handle: ServerGoalHandle, result: Result) -> None:
+        self._statistics.finish(result)
+        if result.outcome == SUCCESS:
+            self.get_logger().info(f"the door is open by {result.door_angle:.2f} rad")
+            goal_handle.succeed()
+            return
+        self.get_logger().warning(f"the door was not opened, {result.outcome}: {result.reason}")
+        if goal_handle.is_cancel_requested:
+            goal_handle.canceled()
+        else:
+            goal_handle.abort()
+
+    def _feed_back(self, goal_handle: ServerGoalHandle, feedback: Feedback) -> None:
+        """Publish what is being done, but not more often than once in a period for each phase."""
+        now = time.monotonic()
+        if feedback.phase == self._phase and now - self._fed_back < FEEDBACK_PERIOD:
+            return
+        self._phase, self._fed_back = feedback.phase, now
+        self._statistics.enter(feedback.phase)
+        goal_handle.publish_feedback(OpenDoor.Feedback(**feedback._asdict()))
+
+    def _refuse(self, reason: str, text: str) -> None:
+        self._statistics.refuse(reason)
+        self._warn(reason, text)
+
+    def _warn(self, key: str, text: str) -> None:
+        """Log a warning, but not more often than once in a period for each key."""
+        now = time.monotonic()
+        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[key] = now
+            self.get_logger().warning(text)
+
+    def _report(self) -> None:
+        try:
+            self._door.values(self.now())
+            doubt = ""
+        except DoorError as error:
+            doubt = str(error)
+        name = self.get_fully_qualified_name()
+        report = DiagnosticArray(status=self._statistics.report(name, doubt))
+        report.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics_publisher.publish(report)
+
+    def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        """Take over changed parameters together, or refuse them with the reason.
+
+        A goal that runs goes on with those that it began with.
+        """
+        values = read_parameters(self)
+        values.update((p.name, p.value) for p in parameters if p.name in values)
+        try:
+            settings = NodeSettings.check(values)
+        except (OSError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self._settings = settings
+        self._door.settings, self._watch.settings = settings.door, settings.states
+        return SetParametersResult(successful=True)

@@ -1,0 +1,99 @@
+"""Solves the policy for one first guess, coarse to fine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import robotic as ry
+from numpy.typing import NDArray
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_skill.check import PlanRejected, check
+from kmn_skill.plan import Plan, PlanRequest
+from kmn_skill.policy import Policy, near_pairs, pairs
+from kmn_skill.robot import Robot
+from kmn_skill.settings import SkillSettings
+from kmn_skill.timing import timed_plan
+from kmn_skill.transfer import refine, transfer
+from kmn_skill.world import World
+
+
+class Solver:
+    """Solves the policy; what does not depend on the request is loaded once."""
+
+    def __init__(self) -> None:
+        self._settings, self._robot = SkillSettings.load(), Robot.load()
+        self.model = KinematicModel.load("door")
+        self.world(np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma)))
+
+    def world(self, theta: NDArray[np.float64], gamma: NDArray[np.float64]) -> World:
+        """Return the world of the door m(theta, gamma)."""
+        return World(self.model, theta, gamma, self._robot, self._settings.grasp)
+
+    def plan(self, request: PlanRequest, guess: NDArray[np.float64], name: str) -> Plan:
+        """Return a plan that passes the check.
+
+        Parameters
+        ----------
+        guess
+            (T + 1, 13) solution for a prototype, to be transferred.
+        name
+            Of the guess.
+
+        Raises
+        ------
+        PlanRejected
+            If the solution does not pass.
+        """
+        world = self.world(request.theta, request.gamma)
+        path = self._solve(world, request, transfer(guess, self.model, request))
+        plan = timed_plan(path, request, self._robot, self._settings.timing)
+        plan = replace(plan, report=replace(plan.report, seed_used=name))
+        return replace(plan, report=check(plan, request, world))
+
+    def coarse(
+        self, world: World, request: PlanRequest, guess: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the solution (T, 13) with few configurations, from a guess of as many.
+
+        Raises
+        ------
+        PlanRejected
+            If it is none.
+        """
+        settings = self._settings
+        slices, around = settings.planner.coarse, pairs(settings.policy, world)
+        policy = Policy(world, self._robot, request, settings.policy, slices, around)
+        path, violation = optimise(policy.problem, guess, settings.planner.coarse_options)
+        if violation > settings.planner.violation:
+            raise PlanRejected("no motion was found that fulfils all constraints")
+        return path
+
+    def _solve(
+        self, world: World, request: PlanRequest, guess: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        settings = self._settings
+        path = self.coarse(world, request, guess)
+        around = pairs(settings.policy, world)
+        around = near_pairs(world, around, path, settings.planner.near)
+        slices = settings.planner.fine
+        policy = Policy(world, self._robot, request, settings.policy, slices, around)
+        finer = refine(path, self._start(request), slices)
+        return optimise(policy.problem, finer, settings.planner.fine_options)[0]
+
+    def _start(self, request: PlanRequest) -> NDArray[np.float64]:
+        return np.concatenate([request.start, request.door_start])
+
+
+def optimise(
+    problem: Any, guess: NDArray[np.float64], options: Mapping[str, float]
+) -> tuple[NDArray[np.float64], float]:
+    """Return where the solver ends (T, 13), and how much it violates the constraints."""
+    problem.initWithPath(guess)
+    solver = ry.NLP_Solver(problem.nlp(), verbose=0)
+    solver.setOptions(verbose=0, **options)
+    result = solver.solve()
+    return np.array(problem.getPath()), float(result.eq + result.ineq)

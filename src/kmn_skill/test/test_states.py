@@ -1,0 +1,99 @@
+"""States that stop, jump or go back in time are noticed."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from kmn_skill.errors import StatesError
+from kmn_skill.states import Sample, StateSettings, StateWatch
+
+SETTINGS = StateSettings(state_timeout=1.0, max_speed=4.0, max_jump=0.1)
+NAMES = ("base_x", "arm")
+
+
+class SteadyClock:
+    """A clock that the test sets."""
+
+    time = 0.0
+
+    def __call__(self) -> float:
+        return self.time
+
+
+@pytest.fixture
+def clock() -> SteadyClock:
+    return SteadyClock()
+
+
+@pytest.fixture
+def watch(clock: SteadyClock) -> StateWatch:
+    made = StateWatch(SETTINGS, NAMES, clock)
+    made.put("joint_states", Sample(10.0, np.array([1.0, 2.0])))
+    made.put("door_state", Sample(10.0, np.array([-0.1, -0.2])))
+    return made
+
+
+def reason(watch: StateWatch, now: float) -> str:
+    with pytest.raises(StatesError) as raised:
+        watch.newest(now)
+    return raised.value.reason
+
+
+def test_the_newest_state_is_that_of_robot_and_door(watch: StateWatch) -> None:
+    state = watch.newest(10.1)
+    assert (state.time, *state.robot, state.hinge, state.handle) == (10.0, 1.0, 2.0, -0.1, -0.2)
+
+
+def test_both_are_needed() -> None:
+    watch = StateWatch(SETTINGS, NAMES)
+    assert reason(watch, 0.0) == "no_states"
+    watch.put("joint_states", Sample(0.0, np.zeros(2)))
+    assert reason(watch, 0.0) == "no_states"
+
+
+@pytest.mark.parametrize("now", [11.5, 8.5])
+def test_stamps_of_another_time_are_stale(watch: StateWatch, now: float) -> None:
+    assert reason(watch, now) == "stale_states"
+
+
+def test_silence_is_noticed_although_the_clock_of_the_states_stands_still(
+    watch: StateWatch, clock: SteadyClock
+) -> None:
+    clock.time = 1.5
+    assert reason(watch, 10.0) == "states_stopped"
+
+
+def test_a_motion_is_no_break(watch: StateWatch) -> None:
+    watch.put("joint_states", Sample(10.5, np.array([3.0, 0.0])))
+    watch.put("door_state", Sample(10.02, np.array([-0.15, -0.2])))
+    assert watch.breaks == 0
+
+
+@pytest.mark.parametrize(
+    ("topic", "sample", "text"),
+    [
+        ("joint_states", Sample(10.02, np.array([1.0, 2.5])), "arm jumped by 0.50"),
+        ("door_state", Sample(10.02, np.array([-0.9, -0.2])), "hinge jumped by 0.80"),
+        ("joint_states", Sample(0.02, np.array([1.0, 2.0])), "went back by 9.98 s"),
+    ],
+)
+def test_jumps_and_times_that_go_back_are_breaks(
+    watch: StateWatch, topic: str, sample: Sample, text: str
+) -> None:
+    watch.put(topic, sample)
+    assert watch.breaks == 1
+    assert text in watch.last_break
+
+
+def test_waiting_ends_with_the_next_state(watch: StateWatch) -> None:
+    sample = Sample(10.1, np.array([1.0, 2.0]))
+    timer = threading.Timer(0.05, watch.put, ("joint_states", sample))
+    timer.start()
+    before = time.monotonic()
+    watch.wait(60.0)
+    assert time.monotonic() - before < 30.0
+    assert watch.newest(10.1).time == 10.1

@@ -1,0 +1,76 @@
+"""skill_node as a program: how it starts, what it says when it cannot, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("robotic")
+
+
+def start(domain: int, *parameters: str, **environment: str) -> subprocess.Popen[str]:
+    arguments = [text for parameter in parameters for text in ("-p", parameter)]
+    return subprocess.Popen(
+        [sys.executable, "-m", "kmn_skill.start_skill_node", "--ros-args", *arguments],
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain), **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def children(pid: int) -> list[str]:
+    """Return the numbers of the processes that a process started."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [child for task in tasks for child in task.read_text().split()]
+
+
+def runs(pid: str) -> bool:
+    """Tell whether a process runs; one that ended but is not waited for has no command line."""
+    try:
+        return bool(Path(f"/proc/{pid}/cmdline").read_text())
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_it_ends_quietly_and_its_planner_with_it(
+    interrupt: signal.Signals, domain: int
+) -> None:
+    process = start(domain)
+    assert process.stdout is not None
+    while "opening doors" not in (line := process.stdout.readline()):
+        assert line, "skill_node ended"
+    started = children(process.pid)
+    assert started
+    process.send_signal(interrupt)
+    rest, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Traceback" not in rest
+    deadline = time.monotonic() + 10.0
+    while any(map(runs, started)):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("model:=elephant", "'elephant' is neither a file nor"),
+        ("model:=box_a", "'model' must be that of a door"),
+        ("retries:=-1", "retries"),
+        ("world_frame:=''", "'world_frame' is empty"),
+    ],
+)
+def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:
+    process = start(domain, parameter)
+    printed, _ = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert "Traceback" not in printed
+    assert text in printed

@@ -23,7 +23,7 @@ def open3d_box(points: NDArray[np.float32]) -> UprightBox:
     import open3d
 
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(np.float64)))
-    box = cloud.get_minimal_oriented_bounding_box()
+    box = cloud.get_minimal_oriented_bounding_box(robust=True)  # also flat ones
     up = int(np.argmax(np.abs(box.R[2])))
     first, second = (axis for axis in range(3) if axis != up)
     yaw = float(np.arctan2(box.R[1, first], box.R[0, first]))

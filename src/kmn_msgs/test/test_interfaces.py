@@ -49,6 +49,10 @@ FIELDS = {
         "reason": "string",
         "handle_angle": "double",
         "door_angle": "double",
+        "planning_time": "double",
+        "contact_error": "double",
+        "clearance": "double",
+        "attempts": "uint32",
     },
     OpenDoor.Feedback: {
         "phase": "string",

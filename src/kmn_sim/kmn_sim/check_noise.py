@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -18,19 +17,17 @@ from tqdm import tqdm
 from kmn_perception.camera import Camera
 from kmn_perception.columns import columns
 from kmn_perception.command_line import output_file, whole_number
-from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimator import Status
+from kmn_perception.frames.experiment import load_pipeline
+from kmn_perception.frames.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.observation import Observation
+from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.resources import share_directory
-from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 from kmn_sim.kinect import Kinect, KinectSettings
 from kmn_sim.noise_statistics import inverse_step, missing_runs, plane_noise
 
 CAMERA = "kinect_v1"
-TABLE, BOX = 1, 20  # labels; the first object has nothing before it
-PLANE = SupportPlaneSettings(distance=0.01, max_tilt=1.3, min_fraction=0.2)
-ESTIMATOR = EstimatorSettings(10, 0.05, 200, 0.03, 0.1, refine=True)
-FLOOR = 0.008  # metres above the table that belong to it
 TABLE_SIZE = (6.0, 6.0, 0.01)  # metres
 DISTANCES = (0.6, 0.8, 1.0, 1.2)  # metres
 REACH = 0.05  # metres about each distance
@@ -52,38 +49,28 @@ class Twins(NamedTuple):
     simulated: Frame
 
 
-def frames() -> Iterator[tuple[NDArray[np.uint16], NDArray[np.uint8]]]:
-    """Yield depth (mm, 0 for none) and labels (height, width) of the shipped real frames."""
-    for file in sorted((share_directory() / "data" / "kinect_boxes").glob("*_d.png")):
-        labels = file.with_name(file.name.replace("_d", "_l"))
-        depth, label = (cv2.imread(str(f), cv2.IMREAD_UNCHANGED) for f in (file, labels))
-        yield np.asarray(depth, dtype=np.uint16), np.asarray(label, dtype=np.uint8)
-
-
-def twins(count: int, seed: int) -> Iterator[Twins]:
-    """Yield real frames with their simulated twins, at most ``count``."""
-    model = MorphEstimator.load("box", "", ESTIMATOR)
-    settings = KinectSettings.load()
-    for number, (millimetres, labels) in zip(range(count), frames(), strict=False):
-        depth = np.where(millimetres, millimetres / 1e3, np.nan).astype(np.float32)
-        real = Frame(depth, labels == TABLE, labels == BOX)
-        scene = scene_of(real, model)
+def twins(frames: Sequence[LabelledFrame], seed: int) -> Iterator[Twins]:
+    """Yield real frames with their simulated twins; frames without an estimate are left out."""
+    pipeline, settings = load_pipeline(), KinectSettings.load()
+    for number, frame in enumerate(frames):
+        real = Frame(frame.depth, frame.labels == TABLE, frame.labels == frame.objects[0])
+        scene = scene_of(real, pipeline)
         if scene is not None:
-            kinect = Kinect(settings, seed + number)
-            yield Twins(real, simulate(*scene, kinect))
+            yield Twins(real, simulate(*scene, Kinect(settings, seed + number)))
 
 
-def scene_of(frame: Frame, estimator: MorphEstimator) -> tuple[Camera, NDArray[np.float64]] | None:
+def scene_of(frame: Frame, pipeline: MorphPipeline) -> tuple[Camera, NDArray[np.float64]] | None:
     """Return the camera and the box's cuboids (B, 4, 4) of a real frame, None if not found."""
-    camera = Camera.load(CAMERA)
+    camera, estimator = Camera.load(CAMERA), pipeline.estimator
     points = depth_to_points(frame.depth, camera)
-    plane = find_support_plane(points, PLANE)
-    if plane is None:
+    try:
+        pose = pipeline.camera_pose(points)
+    except NoCameraPoseError:
         return None
-    pose = pose_above(plane, estimator.model.camera.pose)
     camera = replace(camera, pose=pose)
     seen = points[frame.box & np.isfinite(frame.depth)] @ pose[:3, :3].T + pose[:3, 3]
-    estimate = estimator.estimate(Observation(seen.astype(np.float32), camera, FLOOR))
+    floor = pipeline.settings.background.plane_margin
+    estimate = estimator.estimate(Observation(seen.astype(np.float32), camera, floor))
     if estimate.status != Status.OK:
         return None
     return camera, estimator.model.unit_cubes(estimate.theta, estimate.gamma)
@@ -129,8 +116,8 @@ def missing(pairs: Sequence[Twins]) -> list[dict[str, float]]:
 
 def compare(count: int, seed: int) -> dict[str, dict[str, float]]:
     """Return the statistics ``real`` and ``simulated`` of at most so many frames."""
-    total = min(count, sum(1 for _ in frames()))
-    pairs = list(tqdm(twins(count, seed), total=total, unit="frame"))
+    frames = read_frames(share_directory() / "data" / "kinect_boxes")[:count]
+    pairs = list(tqdm(twins(frames, seed), total=len(frames), unit="frame"))
     return {
         name: {**noise(images), **beside}
         for name, images, beside in zip(

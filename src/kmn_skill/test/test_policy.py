@@ -132,6 +132,6 @@ def test_the_spline_is_cubic() -> None:
     times = np.array([0.0, 0.5, 2.0])
     coefficients = np.array([0.3, -1.0, 2.0, 0.5])
     nodes, velocities = np.polyval(coefficients, times), np.polyval(np.polyder(coefficients), times)
-    at = np.linspace(0.0, 2.0, 21)
+    at = np.linspace(0.0, 2.0, 21, dtype=np.float64)
     found = hermite(nodes[:, None], velocities[:, None], times, at)[:, 0]
     assert found == pytest.approx(np.polyval(coefficients, at))

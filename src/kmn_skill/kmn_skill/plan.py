@@ -45,6 +45,12 @@ class PlanRequest:
     handle_angle: float
     door_angle: float
 
+    def is_finite(self) -> bool:
+        """Tell whether all numbers are finite."""
+        values = (self.theta, self.gamma, self.start, self.door_start)
+        angles = [self.handle_angle, self.door_angle]
+        return all(np.isfinite(value).all() for value in (*values, angles))
+
 
 class Phase(NamedTuple):
     """A part of the plan, from its first to its last configuration, both included."""

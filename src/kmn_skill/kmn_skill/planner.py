@@ -60,6 +60,8 @@ class Planner:
         PlanningCancelled
             If it is not wanted any more.
         """
+        if not request.is_finite():
+            raise PlanningFailed("the request has numbers that are not finite")
         begin = time.monotonic()
         reasons = []
         for guess in prototypes.guesses(

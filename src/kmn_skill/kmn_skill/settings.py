@@ -76,6 +76,8 @@ class PlannerSettings(NamedTuple):
         Pairs that are further apart in the first solution are left out in the final one, metres.
     attempts, spread
         First guesses, and the standard deviation (m and rad) by which they vary.
+    noise
+        Standard deviation of what is added to what the solver starts from, m and rad.
     violation
         Of the constraints, above which the first solution is given up.
     time_limit, attempt_limit
@@ -89,6 +91,7 @@ class PlannerSettings(NamedTuple):
     near: float
     attempts: int
     spread: float
+    noise: float
     violation: float
     time_limit: float
     attempt_limit: float
@@ -201,6 +204,7 @@ def _planner(section: Section, solver: Section) -> PlannerSettings:
         near=section.number("near", 0.0),
         attempts=section.whole_number("attempts", 1, 100),
         spread=section.number("spread", 0.0),
+        noise=section.number("noise", 0.0),
         violation=section.number("violation", 0.0),
         time_limit=section.number("time_limit", 0.0),
         attempt_limit=section.number("attempt_limit", 0.0),

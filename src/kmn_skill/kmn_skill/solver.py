@@ -67,7 +67,9 @@ class Solver:
         settings = self._settings
         slices, around = settings.planner.coarse, pairs(settings.policy, world)
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        path, violation = optimise(policy.problem, guess, settings.planner.coarse_options)
+        path, violation = optimise(
+            policy.problem, guess, settings.planner.coarse_options, settings.planner.noise
+        )
         if violation > settings.planner.violation:
             raise PlanRejected("no motion was found that fulfils all constraints")
         return path
@@ -82,18 +84,28 @@ class Solver:
         slices = settings.planner.fine
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
         finer = refine(path, self._start(request), slices)
-        return optimise(policy.problem, finer, settings.planner.fine_options)[0]
+        return optimise(
+            policy.problem, finer, settings.planner.fine_options, settings.planner.noise
+        )[0]
 
     def _start(self, request: PlanRequest) -> NDArray[np.float64]:
         return np.concatenate([request.start, request.door_start])
 
 
 def optimise(
-    problem: Any, guess: NDArray[np.float64], options: Mapping[str, float]
+    problem: Any, guess: NDArray[np.float64], options: Mapping[str, float], noise: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Return where the solver ends (T, 13), and how much it violates the constraints."""
-    problem.initWithPath(guess)
-    solver = ry.NLP_Solver(problem.nlp(), verbose=0)
+    """Return where the solver ends (T, 13), and how much it violates the constraints.
+
+    The guess gets some noise (m and rad), the same each time: on a guess that almost fulfils the
+    constraints the solver ends at once, before it fulfils them.
+    """
+    program = problem.nlp()
+    low, high = program.getBounds()
+    first = guess.reshape(-1) + np.random.default_rng(0).normal(0.0, noise, guess.size)
+    first = np.where(low < high, np.clip(first, low, high), first)
+    solver = ry.NLP_Solver(program, verbose=0)
     solver.setOptions(verbose=0, **options)
-    result = solver.solve()
-    return np.array(problem.getPath()), float(result.eq + result.ineq)
+    solver.setInitialization(first)
+    result = solver.solve(resampleInitialization=0)
+    return np.array(result.x).reshape(guess.shape), float(result.eq + result.ineq)

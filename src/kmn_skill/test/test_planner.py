@@ -1,0 +1,189 @@
+"""Plans pass a check that rejects broken ones, and the planner survives its process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kmn_perception.kinematic_model import KinematicModel
+from kmn_skill.check import PlanRejected, check
+from kmn_skill.make_prototypes import HOME
+from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
+from kmn_skill.planner import Planner
+from kmn_skill.settings import SkillSettings
+from kmn_skill.timing import peaks
+
+Break = Callable[[Plan], Plan]
+SETTINGS = SkillSettings.load()
+
+
+def request(door_angle: float = -0.9, **changes: Any) -> PlanRequest:
+    asked = PlanRequest(np.zeros(3), np.zeros(4), np.array(HOME), np.zeros(2), -0.7, door_angle)
+    return replace(asked, **changes)
+
+
+@pytest.fixture(scope="module")
+def planner() -> Iterator[Planner]:
+    with Planner() as planner:
+        yield planner
+
+
+@pytest.fixture(scope="module")
+def plan(planner: Planner) -> Plan:
+    return planner.plan(request())
+
+
+def test_a_plan_has_the_form_that_was_agreed(plan: Plan) -> None:
+    count = 4 * SETTINGS.planner.fine + 1
+    assert plan.times.shape == (count,)
+    assert plan.positions.shape == plan.velocities.shape == (count, 11)
+    assert plan.door.shape == (count, 2)
+    assert [phase.name for phase in plan.phases] == ["reach", "grasp", "press", "open"]
+    assert (plan.phases[0].first, plan.phases[-1].last) == (0, count - 1)
+    for before, after in zip(plan.phases, plan.phases[1:], strict=False):
+        assert before.last == after.first
+
+
+def test_the_gripper_closes_while_all_else_rests(plan: Plan) -> None:
+    _, first, last = plan.phases[1]
+    assert plan.times[last] - plan.times[first] == pytest.approx(SETTINGS.timing.dwell)
+    assert np.abs(plan.positions[last, :10] - plan.positions[first, :10]).max() < 1e-3
+    assert not plan.velocities[[first, last]].any()
+    assert plan.positions[last, 10] < plan.positions[first, 10] - 0.2
+
+
+@pytest.mark.parametrize("door_angle", [-0.9, 0.9])
+def test_plans_for_random_doors_reach_their_targets(planner: Planner, door_angle: float) -> None:
+    model = KinematicModel.load("door")
+    theta, gamma = model.split(model.sample(np.random.default_rng(3), 1)[0])
+    asked = request(door_angle, theta=theta, gamma=gamma)
+    found = planner.plan(asked)
+    assert found.report.contact_error <= SETTINGS.check.contact
+    assert found.report.clearance >= SETTINGS.check.clearance
+    assert found.report.duration == found.times[-1]
+    assert found.door[-1] == pytest.approx([door_angle, -0.7], abs=0.01)
+    assert found.positions[0] == pytest.approx(asked.start)
+
+
+def test_a_door_that_is_ajar_is_opened_from_there(planner: Planner) -> None:
+    start = np.array([-1.4, -0.2, 0.1, *HOME[3:]])
+    asked = request(start=start, door_start=np.array([-0.2, -0.05]))
+    found = planner.plan(asked)
+    assert found.door[0] == pytest.approx([-0.2, -0.05])
+    assert found.door[-1, 0] == pytest.approx(-0.9, abs=0.01)
+
+
+def shifted(plan: Plan, joint: int, offset: float, rows: slice) -> Plan:
+    positions = plan.positions.copy()
+    positions[rows, joint] += offset
+    # Slowly, so that velocities are not what is wrong.
+    return replace(plan, positions=positions, velocities=0.0 * positions, times=100.0 * plan.times)
+
+
+def with_door(plan: Plan, rows: slice, column: int, angle: float) -> Plan:
+    door = plan.door.copy()
+    door[rows, column] = angle
+    return replace(plan, door=door)
+
+
+def with_jerk(plan: Plan) -> Plan:
+    velocities = plan.velocities.copy()
+    velocities[70:73] = 0.0
+    return replace(plan, velocities=velocities)
+
+
+BREAKS: dict[str, Break] = {
+    "not finite": lambda plan: replace(plan, times=np.full_like(plan.times, np.nan)),
+    "away from the present state": lambda plan: shifted(plan, 0, 0.1, slice(0, 1)),
+    "do not increase": lambda plan: replace(plan, times=plan.times[::-1] - plan.times[-1]),
+    "end at rest": lambda plan: replace(plan, velocities=plan.velocities + 0.01),
+    "of the velocity": lambda plan: replace(
+        plan, times=plan.times / 4.0, velocities=4.0 * plan.velocities
+    ),
+    "of the acceleration": with_jerk,
+    "l_elbow_flex_joint leaves its limits": lambda plan: shifted(plan, 6, 3.0, slice(50, 60)),
+    "handle is pressed": lambda plan: with_door(plan, slice(150, 152), 1, -0.5),
+    "door is opened": lambda plan: with_door(plan, slice(200, 201), 0, -0.5),
+    "before its handle is pressed": lambda plan: with_door(plan, slice(110, 120), 0, -0.1),
+    "does not close": lambda plan: shifted(plan, 10, 0.3, slice(101, 201)),
+    "mm apart": lambda plan: shifted(plan, 0, -0.02, slice(100, 201)),
+    "comes within": lambda plan: shifted(plan, 0, 0.25, slice(60, 95)),
+}
+
+
+@pytest.mark.parametrize("reason", BREAKS)
+def test_a_broken_plan_is_rejected_with_its_reason(plan: Plan, reason: str) -> None:
+    with pytest.raises(PlanRejected, match=reason):
+        check(BREAKS[reason](plan), request())
+
+
+def test_a_plan_passes_its_check_again(plan: Plan) -> None:
+    report = check(plan, request())
+    assert report.contact_error == pytest.approx(plan.report.contact_error, abs=1e-6)
+
+
+def test_the_prototype_s_plan_does_not_pass_for_another_door(plan: Plan) -> None:
+    with pytest.raises(PlanRejected, match="mm"):
+        check(plan, request(theta=np.array([0.05, 0.0, 0.1])))
+
+
+def test_the_peaks_are_those_of_the_spline() -> None:
+    nodes, velocities = np.array([[0.0], [1.0]]), np.array([[0.0], [0.0]])
+    fastest, sharpest = peaks(nodes, velocities, np.array([2.0]))
+    assert fastest == pytest.approx([0.75])  # of 3 s^2 - 2 s^3, s = t / 2
+    assert sharpest == pytest.approx([1.5])
+
+
+def test_after_its_process_was_killed_the_planner_plans(planner: Planner) -> None:
+    assert planner.pid is not None
+    os.kill(planner.pid, signal.SIGKILL)
+    assert planner.plan(request()).report.contact_error <= SETTINGS.check.contact
+
+
+def test_a_process_that_dies_while_it_plans_is_replaced(planner: Planner) -> None:
+    restarts, pid = planner.restarts, planner.pid
+    assert pid is not None
+    timer = threading.Timer(0.3, os.kill, (pid, signal.SIGKILL))
+    timer.start()
+    found = planner.plan(request())
+    timer.join()
+    assert planner.restarts == restarts + 1
+    assert found.report.seed_used != "pull"  # the guess that it died with is left out
+
+
+def test_a_cancelled_plan_ends_at_once_and_the_next_one_works(planner: Planner) -> None:
+    begin = time.monotonic()
+    with pytest.raises(PlanningCancelled):
+        planner.plan(request(), cancelled=lambda: time.monotonic() > begin + 0.1)
+    assert planner.plan(request(0.9)).door[-1, 0] > 0.0
+
+
+def test_the_time_limit_ends_a_plan() -> None:
+    limits = SETTINGS.planner._replace(time_limit=0.2, attempt_limit=0.1)
+    with (
+        Planner(replace(SETTINGS, planner=limits)) as planner,
+        pytest.raises(PlanningFailed, match=r"longer than 0\.1 s"),
+    ):
+        planner.plan(request())
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"theta": np.array([np.nan, 0.0, 0.0])}, "not finite"),
+        ({"door_angle": -2.5}, "no motion"),
+    ],
+)
+def test_what_cannot_be_planned_has_a_reason(
+    planner: Planner, changes: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(PlanningFailed, match=reason):
+        planner.plan(request(**changes))

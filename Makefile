@@ -34,10 +34,6 @@ demo: build $(READY)simulation  ## let a simulated PR2 open a door that it sees 
 	@./run kmn_skill demo --seed $(SEED) --mode $(MODE)
 
 .PHONY: demo-bag
-demo-bag: build  ## estimate boxes on real Kinect clouds, through a bag and the nodes
-	@./run kmn_perception demo_bag
-
-.PHONY: demo-bag
 demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures
 	@./run kmn_perception demo_bag
 

@@ -43,7 +43,8 @@ from kmn_skill.skill_node import SkillNode  # noqa: E402
 SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second
 CAMERA_RATE = 0.5  # frames a simulated second
-PATIENT = {"frames": 2, "max_age": 5.0, "door_timeout": 10.0}  # with so slow a camera
+# With so slow a camera and so fast a clock.
+PATIENT = {"frames": 2, "max_age": 5.0, "door_timeout": 10.0, "state_timeout": 1.0 * SPEED}
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
 SIMULATED_TIME = Parameter("use_sim_time", value=True)
 

@@ -30,6 +30,7 @@ from kmn_skill.opening import Goal
 
 POLL_PERIOD = 0.02  # seconds
 QUEUE_DEPTH = 10
+STATE_TIMEOUT, MAX_AGE = 1.0, 3.0  # seconds by the wall's clock, of states and parameters
 FRAMES = 5  # of a new door, after which skill_node relies on no older one
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
 SOURCES = {  # of the door's parameters, and the topic that skill_node takes them from
@@ -141,12 +142,17 @@ class DoorSystem:
         simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, dict[str, Any], list[str]]] = [
             ("kmn_sim.start_sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill.start_skill_node", simulated, [door]),
+            ("kmn_skill.start_skill_node", {**simulated, **self._patience()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
             nodes.append(("kmn_perception.start_morph_node", morph, []))
         return nodes
+
+    def _patience(self) -> dict[str, float]:
+        """Return timeouts that are as long by the wall's clock as the defaults at real time."""
+        pace = max(1.0, self._sim["real_time_factor"])
+        return {"state_timeout": STATE_TIMEOUT * pace, "max_age": MAX_AGE * pace}
 
     def _connect(self) -> None:
         node = self._node

@@ -11,7 +11,7 @@ from multiprocessing.process import BaseProcess
 
 from kmn_skill import prototypes
 from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
-from kmn_skill.planning_process import serve
+from kmn_skill.planning_process import READY, serve
 from kmn_skill.settings import SkillSettings
 
 POLL_PERIOD = 0.02  # seconds
@@ -31,6 +31,7 @@ class Planner:
         self._settings = (settings or SkillSettings.load()).planner
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
+        self._loaded = False
         self.restarts = 0
 
     def __enter__(self) -> Planner:
@@ -62,46 +63,73 @@ class Planner:
         """
         if not request.is_finite():
             raise PlanningFailed("the request has numbers that are not finite")
-        begin = time.monotonic()
+        begin, left = time.monotonic(), self._settings.time_limit
         reasons = []
         for guess in prototypes.guesses(
             request.door_angle, self._settings.attempts, self._settings.spread
         ):
-            left = self._settings.time_limit - (time.monotonic() - begin)
             if left <= 0.0:
                 reasons.append(f"the {self._settings.time_limit:g} s are over")
                 break
-            answer = self._attempt(
-                request, guess, min(left, self._settings.attempt_limit), cancelled
-            )
+            connection = self._ready(cancelled)
+            attempted = time.monotonic()
+            limit = min(left, self._settings.attempt_limit)
+            answer = self._attempt(connection, request, guess, limit, cancelled)
+            left -= time.monotonic() - attempted
             if isinstance(answer, Plan):
                 passed = time.monotonic() - begin
                 return replace(answer, report=replace(answer.report, planning_time=passed))
             reasons.append(answer)
         raise PlanningFailed("; ".join(dict.fromkeys(reasons)))
 
+    def _ready(self, cancelled: Callable[[], bool]) -> Connection:
+        """Return the connection to a process that has loaded all it needs.
+
+        That takes seconds, and is no part of a plan's time.
+
+        Raises
+        ------
+        PlanningFailed
+            If the process does not start.
+        PlanningCancelled
+            If the plan is not wanted any more.
+        """
+        if self._process is None or not self._process.is_alive():
+            self._restart()
+        assert self._connection is not None
+        deadline = time.monotonic() + self._settings.start_limit
+        while not self._loaded:
+            if cancelled():
+                raise PlanningCancelled
+            if time.monotonic() > deadline:
+                raise PlanningFailed("the planner's process does not start")
+            try:
+                if self._connection.poll(POLL_PERIOD):
+                    self._loaded = self._connection.recv() == READY
+            except (EOFError, OSError):
+                raise PlanningFailed("the planner's process died while it started") from None
+        return self._connection
+
     def _attempt(
         self,
+        connection: Connection,
         request: PlanRequest,
         guess: prototypes.Prototype,
         limit: float,
         cancelled: Callable[[], bool],
     ) -> Plan | str:
         """Return the plan that a first guess leads to, or why there is none."""
-        if self._process is None or not self._process.is_alive():
-            self._restart()
-        assert self._connection is not None
         deadline = time.monotonic() + limit
         try:
-            self._connection.send((request, guess))
-            while not self._connection.poll(POLL_PERIOD):
+            connection.send((request, guess))
+            while not connection.poll(POLL_PERIOD):
                 if cancelled():
                     self._restart()
                     raise PlanningCancelled
                 if time.monotonic() > deadline:
                     self._restart()
                     return f"the solver took longer than {limit:.1f} s"
-            answer: Plan | str = self._connection.recv()
+            answer: Plan | str = connection.recv()
         except (EOFError, OSError):
             self._restart()
             return "the planner's process died"
@@ -112,6 +140,7 @@ class Planner:
         self._connection, other = context.Pipe()
         self._process = context.Process(target=serve, args=(other,), name="planner", daemon=True)
         self._process.start()
+        self._loaded = False
         other.close()
 
     def _restart(self) -> None:

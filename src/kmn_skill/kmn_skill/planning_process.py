@@ -7,9 +7,11 @@ import signal
 import tempfile
 from multiprocessing.connection import Connection
 
+READY = "ready"  # is sent when all is loaded
+
 
 def serve(connection: Connection) -> None:
-    """Answer each (request, guess) with a plan that passed the check, or why there is none."""
+    """Say when ready, then answer each (request, guess) with a plan, or why there is none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # the package robotic writes a log where it is
@@ -22,6 +24,7 @@ def _answer(connection: Connection) -> None:
     from kmn_skill.solver import Solver
 
     solver = Solver()
+    connection.send(READY)
     while True:
         try:
             request, guess = connection.recv()

@@ -80,8 +80,8 @@ class PlannerSettings(NamedTuple):
         Standard deviation of what is added to what the solver starts from, m and rad.
     violation
         Of the constraints, above which the first solution is given up.
-    time_limit, attempt_limit
-        Seconds for a plan, and for one first guess.
+    time_limit, attempt_limit, start_limit
+        Seconds for a plan, for one first guess, and for the planner's process to start.
     coarse_options, fine_options
         Of the solver.
     """
@@ -95,6 +95,7 @@ class PlannerSettings(NamedTuple):
     violation: float
     time_limit: float
     attempt_limit: float
+    start_limit: float
     coarse_options: dict[str, float]
     fine_options: dict[str, float]
 
@@ -208,6 +209,7 @@ def _planner(section: Section, solver: Section) -> PlannerSettings:
         violation=section.number("violation", 0.0),
         time_limit=section.number("time_limit", 0.0),
         attempt_limit=section.number("attempt_limit", 0.0),
+        start_limit=section.number("start_limit", 0.0),
         coarse_options=_options(solver.section("coarse")),
         fine_options=_options(solver.section("fine")),
     )

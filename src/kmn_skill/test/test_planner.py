@@ -175,6 +175,15 @@ def test_the_time_limit_ends_a_plan() -> None:
         planner.plan(request())
 
 
+def test_a_process_that_does_not_start_is_told() -> None:
+    limits = SETTINGS.planner._replace(start_limit=0.0)
+    with (
+        Planner(replace(SETTINGS, planner=limits)) as planner,
+        pytest.raises(PlanningFailed, match="does not start"),
+    ):
+        planner.plan(request())
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [

@@ -14,12 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
-from rclpy.executors import (
-    Executor,
-    ExternalShutdownException,
-    MultiThreadedExecutor,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
@@ -41,17 +36,15 @@ class Graph:
     def __init__(self, context: Context, stack: ExitStack) -> None:
         self.context, self._stack = context, stack
 
-    def start(self, make_node: Callable[..., Node], threads: int = 1, **options: Any) -> Any:
+    def start(self, make_node: Callable[..., Node], **options: Any) -> Any:
         """Make a node and spin it until the end of the test."""
-        return self._stack.enter_context(self.running(make_node, threads, **options))
+        return self._stack.enter_context(self.running(make_node, **options))
 
     @contextmanager
-    def running(
-        self, make_node: Callable[..., Node], threads: int = 1, **options: Any
-    ) -> Iterator[Any]:
+    def running(self, make_node: Callable[..., Node], **options: Any) -> Iterator[Any]:
         """Make a node and spin it until the end of the context."""
         node = make_node(context=self.context, **options)
-        with spinning(node, threads):
+        with spinning(node):
             yield node
 
     @staticmethod
@@ -149,11 +142,9 @@ class Client(Node):
 
 
 @contextmanager
-def spinning(node: Node, threads: int = 1) -> Iterator[None]:
-    """Spin a node in a thread or more, and destroy it at the end."""
-    executor: Executor = SingleThreadedExecutor(context=node.context)
-    if threads > 1:
-        executor = MultiThreadedExecutor(threads, context=node.context)
+def spinning(node: Node) -> Iterator[None]:
+    """Spin a node in a thread, and destroy it at the end."""
+    executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
 
     def spin() -> None:

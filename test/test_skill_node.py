@@ -44,7 +44,7 @@ SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second
 CAMERA_RATE = 0.5  # frames a simulated second
 # With so slow a camera and so fast a clock.
-PATIENT = {"frames": 2, "max_age": 5.0, "door_timeout": 10.0, "state_timeout": 1.0 * SPEED}
+PATIENT = {"frames": 2, "max_age": 20.0, "door_timeout": 40.0, "state_timeout": 1.0 * SPEED}
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
 SIMULATED_TIME = Parameter("use_sim_time", value=True)
 
@@ -185,7 +185,7 @@ def system(graph: Any) -> Iterator[System]:
     reliable = Parameter("reliability", value="reliable")
     graph.start(MorphNode, parameter_overrides=[SIMULATED_TIME, reliable])
     patient = [Parameter(name, value=value) for name, value in PATIENT.items()]
-    graph.start(SkillNode, threads=3, parameter_overrides=[SIMULATED_TIME, *patient])
+    graph.start(SkillNode, parameter_overrides=[SIMULATED_TIME, *patient])
     assert made.action.wait_for_server(30.0)
     made.graph.wait_for(lambda: made.perceived)
     yield made

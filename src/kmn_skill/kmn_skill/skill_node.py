@@ -16,12 +16,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
@@ -49,7 +49,7 @@ QUEUE_DEPTH = 10
 
 
 class SkillNode(Node):
-    """Opens one door at a time, in a thread of its executor, which needs more than one.
+    """Opens one door at a time, in a thread of its own; the executor only takes messages.
 
     Raises
     ------
@@ -74,9 +74,8 @@ class SkillNode(Node):
         self._planner = self._ending.enter_context(Planner(settings.skill))
         self._statistics = SkillStatistics()
         self._warned: dict[str, float] = {}
-        self._lock, self._idle = threading.Lock(), threading.Event()
-        self._idle.set()
-        self._closing = False
+        self._busy, self._closing = False, False
+        self._worker: threading.Thread | None = None  # of the goal
         self._fed_back, self._phase = 0.0, ""
         self._connect()
         self.add_on_set_parameters_callback(self._on_parameters)
@@ -85,7 +84,8 @@ class SkillNode(Node):
     def destroy_node(self) -> None:
         """Let the robot hold, and end the planner and the node."""
         self._closing = True
-        self._idle.wait()
+        if self._worker is not None:
+            self._worker.join()
         self._ending.close()
         super().destroy_node()
 
@@ -126,27 +126,19 @@ class SkillNode(Node):
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, "/diagnostics", QUEUE_DEPTH
         )
-        group = MutuallyExclusiveCallbackGroup()
         for topic in self._joints:
-            self.create_subscription(
-                JointState, topic, partial(self._on_state, topic), 1, callback_group=group
-            )
+            self.create_subscription(JointState, topic, partial(self._on_state, topic), 1)
         self.create_subscription(
-            MorphingParameters,
-            "morphing_parameters",
-            self._on_parameters_of_door,
-            QUEUE_DEPTH,
-            callback_group=group,
+            MorphingParameters, "morphing_parameters", self._on_parameters_of_door, QUEUE_DEPTH
         )
         # A steady clock: reports go on when a simulated time stops or jumps.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady, callback_group=group)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
         self._server = ActionServer(
             self,
             OpenDoor,
             "open_door",
             self._on_open_door,
-            callback_group=ReentrantCallbackGroup(),
             goal_callback=self._on_goal,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
@@ -173,23 +165,32 @@ class SkillNode(Node):
 
     def _on_goal(self, request: OpenDoor.Goal) -> GoalResponse:
         """Accept a goal if none runs; whether it can be reached is for its result to tell."""
-        with self._lock:
-            if self._idle.is_set() and not self._closing:
-                self._idle.clear()
-                return GoalResponse.ACCEPT
+        if not self._busy and not self._closing:
+            self._busy = True
+            return GoalResponse.ACCEPT
         text = "goal rejected: another one runs, which must end or be cancelled first"
         self._statistics.reject(text)
         self._warn("rejected", text)
         return GoalResponse.REJECT
 
-    def _on_open_door(self, goal_handle: ServerGoalHandle) -> OpenDoor.Result:
+    async def _on_open_door(self, goal_handle: ServerGoalHandle) -> OpenDoor.Result:
+        """Open the door in a thread, so that the executor goes on meanwhile."""
+        executor = self.executor
+        assert executor is not None
+        done = Future()
+        done.add_done_callback(lambda _: executor.wake())
+        self._worker = threading.Thread(target=self._work, args=(goal_handle, done), name="goal")
+        self._worker.start()
+        return messages.result_message(await done)
+
+    def _work(self, goal_handle: ServerGoalHandle, done: Future) -> None:
         request = goal_handle.request
+        result = self._open(goal_handle, Goal(request.handle_angle, request.door_angle))
         try:
-            result = self._open(goal_handle, Goal(request.handle_angle, request.door_angle))
             self._finish(goal_handle, result)
         finally:
-            self._idle.set()
-        return messages.result_message(result)
+            self._busy = False
+            done.set_result(result)
 
     def _open(self, goal_handle: ServerGoalHandle, goal: Goal) -> Result:
         settings = self._settings

@@ -7,13 +7,11 @@ import sys
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import MultiThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from kmn_skill.skill_node import SkillNode
-
-THREADS = 3  # one for the goal, two for what comes meanwhile
 
 
 def main() -> int:
@@ -36,7 +34,7 @@ def _run() -> int:
     except (OSError, ValueError, ParameterException) as error:
         print(f"skill_node: {error}", file=sys.stderr)
         return 1
-    executor = MultiThreadedExecutor(THREADS)
+    executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
         executor.spin()

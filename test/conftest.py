@@ -25,7 +25,7 @@ from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.morph_node import MorphNode
 from kmn_perception.node_parameters import DESCRIPTORS
 
-TIMEOUT = 60.0  # seconds until a test gives up to wait
+TIMEOUT = 120.0  # seconds until a test gives up to wait
 
 Found = TypeVar("Found")
 

@@ -232,6 +232,23 @@ def test_a_second_goal_is_rejected_and_a_cancelled_one_holds_the_robot(system: S
     assert int(system.report()["goals_rejected"]) == 1
 
 
+def test_a_robot_that_hides_the_door_opens_it_all_the_same(system: System) -> None:
+    system.start_anew()
+    first = system.send()
+    system.wait_for_phase("reach", 0.2)
+    system.wait(first.cancel_goal_async())
+    system.result(first)
+    system.graph.wait_for(lambda: system.perceived[-1].status != MorphingParameters.OK)
+    assert system.set("skill_node", door_timeout=0.2).successful
+    try:
+        status, result = system.result(system.send())
+    finally:
+        assert system.set("skill_node", **PATIENT).successful
+    assert result.reason == ""
+    assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)
+    assert any("before the robot drove up" in text for text in system.log)
+
+
 BAD: dict[str, dict[str, Any]] = {
     "x = 2.000 is outside": {"theta": [2.0, 0.0, 0.0]},
     "parameters are not finite": {"theta": [math.nan, 0.0, 0.0]},

@@ -140,6 +140,12 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "limit_margin": _real(
         "Part of its range by which a parameter may exceed its limits.", 0.0, 1.0
     ),
+    "hidden_distance": _real(
+        "After driving so far the robot may hide the door: where it was before is relied upon "
+        "when it is not seen [m].",
+        0.0,
+        1000.0,
+    ),
     "planning_time": _real("A plan may take so long [s].", 0.1, 600.0, read_only=True),
     "start_delay": _real("From sending the first part of a plan to its start [s].", 0.0, 10.0),
     "part_duration": _real("Time of the plan that a part covers [s].", 0.2, 60.0),

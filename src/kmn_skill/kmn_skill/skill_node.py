@@ -32,6 +32,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.messages import MessageError
 from kmn_skill import messages
 from kmn_skill.diagnostics import SkillStatistics
+from kmn_skill.door_memory import DoorMemory
 from kmn_skill.errors import DoorError
 from kmn_skill.execution import Part
 from kmn_skill.node_parameters import NodeSettings, declare_parameters, read_parameters
@@ -69,6 +70,7 @@ class SkillNode(Node):
             "door_state": tuple(joint.name for joint in settings.model.joints),
         }
         self._door = PerceivedDoor(settings.model, settings.world_frame, settings.door)
+        self._memory = DoorMemory()
         self._watch = StateWatch(settings.states, robot_joints)
         self._ending = ExitStack()
         self._planner = self._ending.enter_context(Planner(settings.skill))
@@ -97,9 +99,13 @@ class SkillNode(Node):
         """Publish a plan as markers."""
         report, model = plan.report, self._settings.model
         self._statistics.plan(report.planning_time)
+        door = ", ".join(
+            f"{parameter.name} {value:.3f}"
+            for parameter, value in zip(model.parameters, values, strict=True)
+        )
         self.get_logger().info(
-            f"plan of {report.duration:.1f} s found within {report.planning_time:.2f} s, "
-            f"clearance {report.clearance:.3f} m"
+            f"plan of {report.duration:.1f} s for the door {door}: found within "
+            f"{report.planning_time:.2f} s, clearance {report.clearance:.3f} m"
         )
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.world_frame)
         self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
@@ -152,7 +158,8 @@ class SkillNode(Node):
         breaks = self._watch.breaks
         self._watch.put(topic, sample)
         if self._watch.breaks != breaks:
-            self._door.forget()
+            self._door.forget(sample.time)
+            self._memory.forget()
             self._warn("break", f"another world: {self._watch.last_break}")
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
@@ -197,6 +204,7 @@ class SkillNode(Node):
         opening = DoorOpening(
             settings.model,
             self._door,
+            self._memory,
             self._watch,
             self._planner,
             self,

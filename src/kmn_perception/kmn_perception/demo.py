@@ -31,11 +31,12 @@ from kmn_perception.camera import Camera
 from kmn_perception.estimator import Status
 from kmn_perception.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_perception.overlay import Overlay, ShownObject, save_pictures
 from kmn_perception.pipeline import PipelineSettings
 from kmn_perception.rendering import depth_to_points
 from kmn_perception.replay import Replay
+from kmn_perception.ros_parameters import declare_parameters
 from kmn_perception.segmentation import segment
 from kmn_perception.support_plane import find_support_plane, pose_above
 
@@ -253,8 +254,7 @@ def run(folder: Path) -> int:
     shutil.rmtree(bag, ignore_errors=True)
     make_example_bag(bag, RATE)
     node = rclpy.create_node("demo", cli_args=node_arguments())
-    declare_parameters(node)
-    settings = NodeSettings.check(read_parameters(node))
+    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     model = KinematicModel.load(settings.model)
     print(f"starting morph_node, which logs to {log}", flush=True)
     answers = estimate_frames(node, model, bag, log)

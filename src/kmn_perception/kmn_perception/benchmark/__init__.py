@@ -21,8 +21,9 @@ from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.columns import columns
 from kmn_perception.command_line import output_file, whole_number
 from kmn_perception.estimator import MorphEstimator
-from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.ros_parameters import declare_parameters
 
 THREADS = 1  # of torch; as morph_node sets it
 
@@ -44,8 +45,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
     """Measure stages and transport with the parameters of morph_node, as written to JSON."""
-    declare_parameters(node)
-    settings = NodeSettings.check(read_parameters(node))
+    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     torch.set_num_threads(THREADS)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)

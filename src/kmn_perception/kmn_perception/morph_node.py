@@ -112,7 +112,7 @@ class MorphNode(Node):
         self._statistics = FrameStatistics()
         self._sensor = SensorWatch(REPORT_PERIOD)
         self._mailbox: Mailbox[Frame] = Mailbox()
-        self._tracker = ObjectTracker(settings.object_distance)
+        self._tracker = ObjectTracker(settings.object_distance, settings.pipeline.objects.memory)
         self._camera_info: CameraInfo | None = None
         self._image_without_info: Image | None = None
         self._last_source, self._last_stamp = "", 0

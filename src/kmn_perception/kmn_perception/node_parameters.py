@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rcl_interfaces.msg import ParameterDescriptor
 
 from kmn_perception.estimator import EstimatorSettings
+from kmn_perception.object_settings import ObjectSettings
 from kmn_perception.pipeline import CameraPose, PipelineSettings
 from kmn_perception.ros_parameters import (
     ParameterError,
@@ -102,6 +103,7 @@ class NodeSettings:
                 given_pose=_pose(values["camera_position"], values["camera_quaternion"]),
                 plane=pick(SupportPlaneSettings, values, "plane_"),
                 background=pick(SegmentationSettings, values),
+                objects=ObjectSettings.load(),
             ),
         )
 

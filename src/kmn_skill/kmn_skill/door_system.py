@@ -21,19 +21,46 @@ from sensor_msgs.msg import JointState
 
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception import resources
+from kmn_perception.configuration import Section
 from kmn_perception.node_process import NodeProcess, ProcessClient, parameter_arguments
 from kmn_skill.experiment import Timeouts
 from kmn_skill.opening import Goal
 
 QUEUE_DEPTH = 10
-STATE_TIMEOUT, MAX_AGE = 1.0, 3.0  # seconds by the wall's clock, of states and parameters
-FRAMES = 5  # of a new door, after which skill_node relies on no older one
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
 SOURCES = {  # of the door's parameters, and the topic that skill_node takes them from
     "perceived": "morphing_parameters",
     "true": "ground_truth",
     "prototype": "prototype_parameters",
 }
+
+
+class Patience(NamedTuple):
+    """How old what skill_node relies on may be by the wall's clock, in seconds or frames.
+
+    Attributes
+    ----------
+    state_timeout, max_age
+        Seconds of states, and of the door's parameters.
+    frames
+        Of a new door, after which skill_node relies on no older one.
+    """
+
+    state_timeout: float
+    max_age: float
+    frames: int
+
+    @classmethod
+    def load(cls) -> Patience:
+        """Read ``config/skill/system.yaml``."""
+        section = Section.load(resources.find("config/skill", "system"))
+        section.allow(cls._fields)
+        return cls(
+            state_timeout=section.number("state_timeout", 0.0),
+            max_age=section.number("max_age", 0.0),
+            frames=section.whole_number("frames", 1, 1000),
+        )
 
 
 class Opened(NamedTuple):
@@ -74,6 +101,7 @@ class DoorSystem:
 
     def __init__(self, sim: dict[str, Any], source: str, timeouts: Timeouts) -> None:
         self._sim, self._source, self._timeouts = sim, source, timeouts
+        self._patience = Patience.load()
         self._processes: list[NodeProcess] = []
         self._stack = ExitStack()
         self._truth: MorphingParameters | None = None
@@ -112,8 +140,9 @@ class DoorSystem:
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
         self._taken.clear()
+        frames = self._patience.frames
         self._client.wait(
-            lambda: self._count_since(since) >= FRAMES, scene, "what perceives the door"
+            lambda: self._count_since(since) >= frames, scene, "what perceives the door"
         )
 
     def open(self, goal: Goal, feedback: Callable[[OpenDoor.Feedback], None]) -> Opened:
@@ -137,17 +166,18 @@ class DoorSystem:
         simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, dict[str, Any], list[str]]] = [
             ("kmn_sim.start_sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill.start_skill_node", {**simulated, **self._patience()}, [door]),
+            ("kmn_skill.start_skill_node", {**simulated, **self._limits_of_age()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
             nodes.append(("kmn_perception.start_morph_node", morph, []))
         return nodes
 
-    def _patience(self) -> dict[str, float]:
+    def _limits_of_age(self) -> dict[str, float]:
         """Return timeouts that are as long by the wall's clock as the defaults at real time."""
         pace = max(1.0, self._sim["real_time_factor"])
-        return {"state_timeout": STATE_TIMEOUT * pace, "max_age": MAX_AGE * pace}
+        patience = self._patience
+        return {"state_timeout": patience.state_timeout * pace, "max_age": patience.max_age * pace}
 
     def _connect(self) -> None:
         node = self._node

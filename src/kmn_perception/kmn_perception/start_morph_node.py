@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from kmn_perception.morph_node import MorphNode
-from kmn_perception.run_node import run_node
+from kmn_perception.ros_program import run_node
 
 
 def main() -> int:

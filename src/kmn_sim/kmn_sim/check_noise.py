@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +15,7 @@ from tqdm import tqdm
 from kmn_perception import resources
 from kmn_perception.camera import Camera
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.configuration import Section
 from kmn_perception.estimator import Status
 from kmn_perception.frames.experiment import load_pipeline
@@ -179,7 +177,7 @@ def main() -> int:
         rows.append([name, *(f"{values[name]:.2f}" for values in result.values())])
     print(columns(rows))
     if options.json:
-        Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, result)
     return 0
 
 

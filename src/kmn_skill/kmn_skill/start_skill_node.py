@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from kmn_perception.run_node import run_node
+from kmn_perception.ros_program import run_node
 from kmn_skill.skill_node import SkillNode
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
@@ -19,7 +18,7 @@ from rclpy.utilities import remove_ros_args
 from kmn_perception.benchmark import stages, transport
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_perception.pipeline import MorphPipeline
@@ -88,7 +87,7 @@ def main() -> None:
         result = benchmark(Node("benchmark"), options.frames)
         print(report(result))
         if options.json:
-            options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+            write_json(options.json, result)
     except KeyboardInterrupt:
         sys.exit("benchmark: interrupted")
     except (OSError, ParameterException, ValueError) as error:

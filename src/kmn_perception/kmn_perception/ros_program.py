@@ -1,10 +1,11 @@
-"""Runs a node as a program, which ends without a traceback, whenever it is stopped."""
+"""Programs that communicate by ROS: they end without a traceback, and say why in one line."""
 
 from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -14,6 +15,8 @@ from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions, install_signal_handlers
 from rclpy.utilities import try_shutdown
+
+from kmn_perception.node_process import ProcessError
 
 
 def run_node(name: str, make_node: Callable[[], Node], has_last_words: bool = False) -> int:
@@ -47,6 +50,25 @@ def run_node(name: str, make_node: Callable[[], Node], has_last_words: bool = Fa
     finally:
         try_shutdown()
     return 0
+
+
+@contextmanager
+def ros_session(name: str) -> Iterator[None]:
+    """Communicate up to the end of a context; an expected error ends the program.
+
+    Parameters
+    ----------
+    name
+        Of the program, for the line that says what is wrong.
+    """
+    try:
+        _init()
+        yield
+    except (OSError, ValueError, ProcessError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        sys.exit(1)
+    finally:
+        try_shutdown()
 
 
 def _init() -> None:

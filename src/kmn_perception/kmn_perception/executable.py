@@ -27,7 +27,7 @@ def executable(module: str, simulator: str | None = None) -> Callable[[], int | 
         try:
             status: int | None = import_module(module).main()
         except ModuleNotFoundError as error:
-            if error.name != simulator:
+            if simulator is None or error.name != simulator:
                 raise
             print(
                 f"{simulator} is missing; install it with: make setup-simulation", file=sys.stderr

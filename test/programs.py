@@ -31,6 +31,16 @@ def start(
     )
 
 
+def read_until(text: str, process: subprocess.Popen[str]) -> str:
+    """Return what a program prints, up to the first line with some text."""
+    assert process.stdout is not None
+    lines: list[str] = []
+    while not lines or text not in lines[-1]:
+        lines.append(process.stdout.readline())
+        assert lines[-1], f"it ended: {''.join(lines)}"
+    return "".join(lines)
+
+
 def parameters(*assignments: str) -> list[str]:
     """Return the ROS arguments that set parameters, each of the form ``NAME:=VALUE``."""
     return [text for assignment in assignments for text in ("-p", assignment)]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from programs import BROKEN_FILES, assert_file_is_refused, parameters, start
+from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 COMMAND = [sys.executable, "-m", "kmn_sim.start_sim_node"]
 
@@ -19,9 +19,7 @@ COMMAND = [sys.executable, "-m", "kmn_sim.start_sim_node"]
 @pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> None:
     process = start(COMMAND, domain)
-    assert process.stdout is not None
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
+    read_until("simulating model", process)
     time.sleep(0.5)  # the handlers are set up right after that line
     process.send_signal(interrupt)
     rest, _ = process.communicate(timeout=60)
@@ -63,13 +61,9 @@ def test_without_the_robots_package_it_says_what_to_install(domain: int, tmp_pat
 
 def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
     process = start(COMMAND, domain, __EGL_VENDOR_LIBRARY_DIRS="/nowhere")
-    assert process.stdout is not None
-    lines = []
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
-        lines.append(line)
-    assert "renderer 'egl' does not start; rendering by 'software'" in "".join(lines)
-    assert "depth by 'software'" in line
+    printed = read_until("simulating model", process)
+    assert "renderer 'egl' does not start; rendering by 'software'" in printed
+    assert "depth by 'software'" in printed.splitlines()[-1]
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
@@ -81,9 +75,7 @@ def test_a_run_is_recorded(domain: int, tmp_path: Path, ending: str) -> None:
     film = tmp_path / f"film.{ending}"
     settings = parameters(f"record:={film}", "real_time_factor:=0.0", "record_rate:=5.0")
     process = start(COMMAND, domain, *settings)
-    assert process.stdout is not None
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
+    read_until("simulating model", process)
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(5.0)
     process.send_signal(signal.SIGINT)

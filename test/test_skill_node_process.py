@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from programs import BROKEN_FILES, assert_file_is_refused, parameters, start
+from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
 
@@ -36,9 +36,7 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     interrupt: signal.Signals, domain: int
 ) -> None:
     process = start(COMMAND, domain)
-    assert process.stdout is not None
-    while "opening doors" not in (line := process.stdout.readline()):
-        assert line, "skill_node ended"
+    read_until("opening doors", process)
     started = children(process.pid)
     assert started
     process.send_signal(interrupt)

@@ -96,7 +96,8 @@ def test_what_is_forgotten_must_be_seen_anew() -> None:
     assert reason(perceived) == "none"
     perceived.add(seen(0.4))  # came late
     assert reason(perceived) == "none"
-    other = VALUES + 0.1
+    other = VALUES.copy()
+    other[1] += 0.05
     for time in (0.5, 0.6, 0.7):
         perceived.add(seen(time, other))
     np.testing.assert_allclose(perceived.values(0.7), other)

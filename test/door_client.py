@@ -27,7 +27,13 @@ from kmn_sim.sim_node import SimNode
 SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second
 CAMERA_RATE = 0.5  # frames a simulated second
+SILENCE = 2.0  # seconds after which a slow machine has perceived all
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
+
+
+def seconds(message: JointState | MorphingParameters) -> float:
+    """Return the stamp of a message in seconds."""
+    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
 
 
 class DoorClient(GraphClient):
@@ -113,8 +119,16 @@ class DoorClient(GraphClient):
     def start_anew(self) -> None:
         """Put the robot and the door where they start, and wait until the door was seen there."""
         assert self.call(self.reset, Trigger.Request()).success
-        time.sleep(0.2)
-        self.perceived.clear()
+        self.joints.clear()
+        now = seconds(self.graph.wait_for(lambda: self.joints)[-1])
+        self.graph.wait_for(lambda: self.perceived and seconds(self.perceived[-1]) > now)
+
+    def wait_until_no_more_is_perceived(self) -> None:
+        """Wait until what was exposed before is perceived, too."""
+        count = -1
+        while len(self.perceived) > count:
+            count = len(self.perceived)
+            time.sleep(SILENCE)
 
     def assert_it_opens(self) -> None:
         """Assert that the door opens from its start."""

@@ -88,18 +88,18 @@ def test_a_second_goal_is_rejected_and_a_cancelled_one_holds_the_robot(system: D
     assert int(system.report()["goals_rejected"]) == 1
 
 
-def test_a_robot_that_hides_the_door_opens_it_all_the_same(system: System) -> None:
+def test_a_robot_that_hides_the_door_opens_it_all_the_same(system: DoorClient) -> None:
     system.start_anew()
     first = system.send()
     system.wait_for_phase("reach", 0.2)
     system.wait(first.cancel_goal_async())
     system.result(first)
     system.graph.wait_for(lambda: system.perceived[-1].status != MorphingParameters.OK)
-    assert system.set("skill_node", door_timeout=0.2).successful
+    assert system.set(door_timeout=0.2).successful
     try:
         status, result = system.result(system.send())
     finally:
-        assert system.set("skill_node", **PATIENT).successful
+        assert system.set(**PATIENT).successful
     assert result.reason == ""
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)
     assert any("before the robot drove up" in text for text in system.log)
@@ -115,8 +115,9 @@ BAD: dict[str, dict[str, Any]] = {
 
 def test_bad_parameters_of_the_door_get_a_clear_result(system: DoorClient) -> None:
     system.start_anew()
-    good = system.graph.wait_for(lambda: system.perceived)[-1]
-    assert system.set_simulator(camera_rate=0.1).successful
+    assert system.set_simulator(camera_rate=0.1, real_time_factor=0.1).successful
+    system.wait_until_no_more_is_perceived()
+    good = system.perceived[-1]
     assert system.set(door_timeout=0.2, max_age=600.0).successful
     try:
         for text, changes in BAD.items():
@@ -130,7 +131,8 @@ def test_bad_parameters_of_the_door_get_a_clear_result(system: DoorClient) -> No
         assert "the newest morphing parameters are" in system.fail()
     finally:
         assert system.set(**PATIENT).successful
-        assert system.set_simulator(camera_rate=CAMERA_RATE).successful
+        pace = {"camera_rate": CAMERA_RATE, "real_time_factor": SPEED}
+        assert system.set_simulator(**pace).successful
     system.assert_it_holds()
 
 

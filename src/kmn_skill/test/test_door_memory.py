@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from kmn_skill.door_memory import DoorMemory
 
-DOOR = np.arange(7.0)
+DOOR: NDArray[np.float64] = np.arange(7, dtype=np.float64)
 metres = st.floats(-5.0, 5.0)
 
 
-def robot(x: float, y: float) -> np.ndarray:
-    return np.array([x, y, *np.zeros(9)])
+def robot(x: float, y: float) -> NDArray[np.float64]:
+    return np.array([x, y, *np.zeros(9)], dtype=np.float64)
 
 
 def test_nothing_is_recalled_before_it_was_kept_and_after_it_was_forgotten() -> None:
@@ -38,4 +39,6 @@ def test_what_was_seen_last_is_recalled() -> None:
     memory = DoorMemory()
     memory.keep(DOOR + 1.0, robot(0.0, 0.0))
     memory.keep(DOOR, robot(1.0, 0.0))
-    np.testing.assert_array_equal(memory.recall(robot(2.0, 0.0), 0.1), DOOR)
+    recalled = memory.recall(robot(2.0, 0.0), 0.1)
+    assert recalled is not None
+    np.testing.assert_array_equal(recalled, DOOR)

@@ -30,7 +30,15 @@ from door_client import CAMERA_RATE, PULL, SPEED, DoorClient  # noqa: E402
 from kmn_skill.skill_node import SkillNode  # noqa: E402
 
 # With so slow a camera and so fast a clock.
-PATIENT = {"frames": 2, "max_age": 20.0, "door_timeout": 40.0, "state_timeout": 1.0 * SPEED}
+PATIENT = {
+    "frames": 2,
+    "max_age": 20.0,
+    "door_timeout": 40.0,
+    "state_timeout": 1.0 * SPEED,
+    "start_delay": 0.3 * SPEED,
+    "part_duration": 2.0 * SPEED,
+    "part_overlap": 0.4 * SPEED,
+}
 SIMULATED_TIME = Parameter("use_sim_time", value=True)
 
 

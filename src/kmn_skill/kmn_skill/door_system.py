@@ -37,29 +37,28 @@ SOURCES = {  # of the door's parameters, and the topic that skill_node takes the
 
 
 class Patience(NamedTuple):
-    """How old what skill_node relies on may be by the wall's clock, in seconds or frames.
+    """How long what is late is waited for.
 
     Attributes
     ----------
-    state_timeout, max_age
-        Seconds of states, and of the door's parameters.
     frames
         Of a new door, after which skill_node relies on no older one.
+    skill_node
+        Parameters of skill_node, in seconds of the wall's clock.
     """
 
-    state_timeout: float
-    max_age: float
     frames: int
+    skill_node: dict[str, float]
 
     @classmethod
     def load(cls) -> Patience:
         """Read ``config/skill/system.yaml``."""
         section = Section.load(resources.find("config/skill", "system"))
         section.allow(cls._fields)
+        parameters = section.section("skill_node")
         return cls(
-            state_timeout=section.number("state_timeout", 0.0),
-            max_age=section.number("max_age", 0.0),
             frames=section.whole_number("frames", 1, 1000),
+            skill_node={name: parameters.number(name, 0.0) for name in parameters.values},
         )
 
 
@@ -166,18 +165,17 @@ class DoorSystem:
         simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, dict[str, Any], list[str]]] = [
             ("kmn_sim.start_sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill.start_skill_node", {**simulated, **self._limits_of_age()}, [door]),
+            ("kmn_skill.start_skill_node", {**simulated, **self._skill_parameters()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
             nodes.append(("kmn_perception.start_morph_node", morph, []))
         return nodes
 
-    def _limits_of_age(self) -> dict[str, float]:
-        """Return timeouts that are as long by the wall's clock as the defaults at real time."""
+    def _skill_parameters(self) -> dict[str, float]:
+        """Return the parameters of skill_node in simulated seconds."""
         pace = max(1.0, self._sim["real_time_factor"])
-        patience = self._patience
-        return {"state_timeout": patience.state_timeout * pace, "max_age": patience.max_age * pace}
+        return {name: pace * value for name, value in self._patience.skill_node.items()}
 
     def _connect(self) -> None:
         node = self._node

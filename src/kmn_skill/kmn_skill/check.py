@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_skill.clearance import Surface, clearance
-from kmn_skill.plan import Phase, Plan, PlanReport, PlanRequest
+from kmn_skill.plan import RELEASE, Phase, Plan, PlanReport, PlanRequest
 from kmn_skill.robot import Robot
 from kmn_skill.settings import SkillSettings
 from kmn_skill.timing import peaks
@@ -58,7 +58,8 @@ def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanR
             f"gripper and handle are {1e3 * contact:.1f} mm apart, allowed are "
             f"{1e3 * limits.contact:g} mm"
         )
-    least, names = _clearance(path, grasp.first * limits.samples, world)
+    released = next((phase.last for phase in plan.phases if phase.name == RELEASE), 0)
+    least, names = _clearance(path, released * limits.samples, grasp.first * limits.samples, world)
     if least < limits.clearance:
         raise PlanRejected(
             f"{names[0]} comes within {1e3 * least:.0f} mm of {names[1]}, expected at least "
@@ -153,14 +154,15 @@ def _surfaces() -> dict[str, Surface]:
 
 
 def _clearance(
-    path: NDArray[np.float64], closing: int, world: World
+    path: NDArray[np.float64], released: int, closing: int, world: World
 ) -> tuple[float, tuple[str, str]]:
     """Return the least distance (m) between what shall not touch, and the names of the two.
 
     Parameters
     ----------
-    closing
-        Configuration from which on the gripper closes about the handle.
+    released, closing
+        Configurations up to which the gripper lets go of the handle, and from which on it closes
+        about it.
     """
     own = boxes(Robot.load())
     around = world.door_boxes(SkillSettings.load().check.stem)
@@ -174,8 +176,8 @@ def _clearance(
             if other in OBSTACLES and body not in MOVING:
                 continue
             held = body in HOLDING and other in ("handle", "stem")
-            until = closing + 1 if held else len(path)
-            distance = clearance(part, poses[part.frame][:until], box, poses[box.frame][:until])
+            free = slice(released, closing + 1) if held else slice(None)
+            distance = clearance(part, poses[part.frame][free], box, poses[box.frame][free])
             if distance < least:
                 least, names = distance, (body, other)
     return least, names

@@ -7,14 +7,21 @@ from numpy.typing import NDArray
 
 
 class DoorMemory:
-    """Keeps the parameters of the closed door that were last relied upon; thread-safe."""
+    """Keeps the parameters of the closed door that were last relied upon; thread-safe.
+
+    Attributes
+    ----------
+    interrupted
+        Whether what they were relied upon for has not come to its end.
+    """
 
     def __init__(self) -> None:
+        self.interrupted = False
         self._kept: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def keep(self, values: NDArray[np.float64], robot: NDArray[np.float64]) -> None:
         """Keep parameters (n + m,) that were seen with the robot (11,) at some place [m, rad]."""
-        self._kept = values, robot
+        self._kept, self.interrupted = (values, robot), True
 
     def forget(self) -> None:
         """Forget the door, as of another world."""

@@ -140,7 +140,7 @@ def tally(trials: Sequence[Trial]) -> dict[str, Any]:
                 "reason": trial.reason,
             }
             for number, trial in enumerate(trials)
-            if not trial.opened
+            if not (trial.executed and trial.opened)
         ],
     }
 

@@ -89,8 +89,8 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     "need_covariance": anything("Parameters whose covariance is unknown are refused."),
     "limit_margin": real("Part of its range by which a parameter may exceed its limits.", 0.0, 1.0),
     "hidden_distance": real(
-        "After driving so far the robot may hide the door: where it was before is relied upon "
-        "when it is not seen [m].",
+        "A robot that drove so far since it saw the door hides it: where it was before is relied "
+        "upon [m].",
         0.0,
         1000.0,
     ),

@@ -110,7 +110,7 @@ class OpeningSettings:
     handle_tolerance, door_tolerance
         By which the angles (rad) may miss the goal.
     hidden_distance
-        Metres after which the robot may hide the door; then where it was before is relied upon.
+        Metres after which the robot hides the door; then where it was before is relied upon.
     """
 
     door_timeout: float
@@ -165,6 +165,7 @@ class DoorOpening:
         try:
             self._check(goal)
             self._open(goal)
+            self._memory.interrupted = False
         except SkillError as error:
             self._commands.hold()
             return self._result(error.reason, str(error))
@@ -218,24 +219,25 @@ class DoorOpening:
             try:
                 state = self._state()
                 self._report(WAIT, 0.0, state)
-                seen = self._door.values(self._commands.now())
-                values = when_closed(self._model, seen, state.hinge)
-                self._memory.keep(values, state.robot)
-                return values
-            except StatesError:
+                return self._door_from(state)
+            except (StatesError, DoorError):
                 if time.monotonic() > deadline:
                     raise
-            except DoorError as error:
-                if time.monotonic() > deadline:
-                    return self._recalled(state, error)
             time.sleep(POLL_PERIOD)
 
-    def _recalled(self, state: WorldState, error: DoorError) -> NDArray[np.float64]:
-        """Return where the door (n + m,) was, if it is the robot that hides it; else raise."""
-        values = self._memory.recall(state.robot, self._settings.hidden_distance)
-        if values is None or error.reason not in HIDDEN:
-            raise error
-        self._commands.tell(f"{error}; relying on where the door was before the robot drove up")
+    def _door_from(self, state: WorldState) -> NDArray[np.float64]:
+        """Return the parameters (n + m,) of the closed door, as seen before the robot hid it."""
+        before = self._memory.recall(state.robot, self._settings.hidden_distance)
+        try:
+            seen = self._door.values(self._commands.now())
+        except DoorError as error:
+            if before is None or not self._memory.interrupted or error.reason not in HIDDEN:
+                raise
+        if before is not None:
+            self._commands.tell("relying on where the door was before the robot drove up to it")
+            return before
+        values = when_closed(self._model, seen, state.hinge)
+        self._memory.keep(values, state.robot)
         return values
 
     def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:

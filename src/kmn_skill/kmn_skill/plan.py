@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PHASES = ("reach", "grasp", "press", "open")
+RELEASE = "release"  # comes before them if the hand is at the handle
 
 
 class PlanningFailed(Exception):  # noqa: N818

@@ -14,9 +14,10 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_skill.check import PlanRejected, check
 from kmn_skill.plan import Plan, PlanRequest
 from kmn_skill.policy import Policy, near_pairs, pairs
+from kmn_skill.release import release
 from kmn_skill.robot import Robot
 from kmn_skill.settings import SkillSettings
-from kmn_skill.timing import timed_plan
+from kmn_skill.timing import preceded, timed_plan
 from kmn_skill.transfer import refine, transfer
 from kmn_skill.world import World
 
@@ -48,9 +49,13 @@ class Solver:
         PlanRejected
             If the solution does not pass.
         """
-        world = self.world(request.theta, request.gamma)
-        path = self._solve(world, request, transfer(guess, self.model, request))
-        plan = timed_plan(path, request, self._robot, self._settings.timing)
+        world, timing = self.world(request.theta, request.gamma), self._settings.timing
+        first = np.vstack([_start(request), release(world, request, self._settings.policy)])
+        begin = replace(request, start=first[-1, :11], door_start=first[-1, 11:])
+        path = self._solve(world, begin, transfer(guess, self.model, begin))
+        plan = timed_plan(path, begin, self._robot, timing)
+        if len(first) > 1:
+            plan = preceded(plan, first, self._robot, timing)
         plan = replace(plan, report=replace(plan.report, seed_used=name))
         return replace(plan, report=check(plan, request, world))
 
@@ -81,8 +86,7 @@ class Solver:
         around = near_pairs(world, around, path, settings.planner.near)
         slices = settings.planner.fine
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        start = np.concatenate([request.start, request.door_start])
-        finer = refine(self._disturbed(path), start, slices)
+        finer = refine(self._disturbed(path), _start(request), slices)
         return optimise(policy.problem, finer, settings.solver)[0]
 
     def _disturbed(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -94,6 +98,11 @@ class Solver:
         """
         generator = np.random.default_rng(0)
         return path + generator.normal(0.0, self._settings.planner.noise, path.shape)
+
+
+def _start(request: PlanRequest) -> NDArray[np.float64]:
+    """Return where robot and door are (13,)."""
+    return np.concatenate([request.start, request.door_start])
 
 
 def optimise(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.plan import PHASES, Phase, Plan, PlanReport, PlanRequest
+from kmn_skill.plan import PHASES, RELEASE, Phase, Plan, PlanReport, PlanRequest
 from kmn_skill.robot import Robot
 from kmn_skill.settings import TimingSettings
 
@@ -43,6 +45,28 @@ def timed_plan(
     phases = tuple(Phase(name, *border) for name, border in zip(PHASES, borders, strict=True))
     return Plan(
         robot.joint_names, times, positions, velocities, nodes[:, 11:].copy(), phases, UNCHECKED
+    )
+
+
+def preceded(plan: Plan, path: NDArray[np.float64], robot: Robot, settings: TimingSettings) -> Plan:
+    """Return a plan that first lets go of the handle.
+
+    Parameters
+    ----------
+    path
+        (R + 1, 13) positions, with the start, up to where the plan begins.
+    """
+    limits = np.array(list(robot.motors.values()))
+    times, velocities = _paced(path[:, :11], limits, settings.least_step)
+    count = len(path) - 1
+    phases = [Phase(name, first + count, last + count) for name, first, last in plan.phases]
+    return replace(
+        plan,
+        times=np.concatenate([times, times[-1] + plan.times[1:]]),
+        positions=np.vstack([path[:, :11], plan.positions[1:]]),
+        velocities=np.vstack([velocities, plan.velocities[1:]]),
+        door=np.vstack([path[:, 11:], plan.door[1:]]),
+        phases=(Phase(RELEASE, 0, count), *phases),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,8 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
     is_open = variances > problem.settings.weak**2
     directions[:, is_open] = _disentangled(directions[:, is_open])
+    for i, j in combinations(np.flatnonzero(is_open), 2):
+        directions[:, [i, j]] = _more_open(problem, fit, directions[:, [i, j]])
     least = problem.settings.limit_softness**2
     values = fit.values
     for _ in range(PASSES if is_open.sum() > 1 else 1):
@@ -71,13 +74,34 @@ def _disentangled(basis: NDArray[np.float64]) -> NDArray[np.float64]:
     return basis / np.linalg.norm(basis, axis=0)
 
 
+def _more_open(problem: Problem, fit: Fit, pair: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a pair of open directions (P, 2), or their sum and difference if these lead farther.
+
+    Where but one end of an object is hidden, neither its size nor its place alone is open, only
+    both together. The pair is scaled so that both move the surface as far.
+    """
+    half = problem.half_range[:, None]
+    weights = problem.pixels_per_unit(fit.values)[:, None]
+    alike = pair / np.linalg.norm(weights * half * pair, axis=0)
+    turned = np.column_stack([alike[:, 0] + alike[:, 1], alike[:, 0] - alike[:, 1]])
+    turned /= np.linalg.norm(turned, axis=0)
+    variances = [
+        max(
+            _segment(problem, fit, fit.values, direction).variance for direction in (half * basis).T
+        )
+        for basis in (pair, turned)
+    ]
+    return turned if variances[1] > variances[0] else pair
+
+
 def _segment(
     problem: Problem, fit: Fit, values: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> Segment:
     """Integrate the likelihood along a direction, within the limits.
 
     Pixels far from the edges that are explained wrongly count as well. The edges count up to their
-    ends, so that the pixels that count do not change with them.
+    ends, so that the pixels that count do not change with them. Where even the best fit leaves much
+    unexplained, neighbouring pixels are wrong together, and each of them says the less.
     """
     depth_information = float(direction @ fit.depth_information @ direction)
 
@@ -88,7 +112,9 @@ def _segment(
         edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
         return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * way**2
 
-    allowed = loss(0.0) + problem.settings.segment_rise
+    least = loss(0.0)
+    doubt = 1.0 + least / problem.settings.segment_doubt
+    allowed = least + problem.settings.segment_rise * doubt
     low, high = (
         _last_allowed(loss, allowed, end) for end in _within_limits(problem, values, direction)
     )
@@ -97,7 +123,7 @@ def _segment(
     edges = np.linspace(low, high, POINTS + 1)
     ways = 0.5 * (edges[1:] + edges[:-1])
     losses = np.array([loss(way) for way in ways])
-    weights = np.exp(losses.min() - losses)
+    weights = np.exp((losses.min() - losses) / doubt)
     weights /= weights.sum()
     median = float(np.interp(0.5, np.append(0.0, np.cumsum(weights)), edges))
     cell = (high - low) / POINTS

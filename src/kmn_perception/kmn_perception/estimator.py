@@ -19,7 +19,7 @@ from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
-MOST = 0.95  # share of the points that must lie on the model, whatever else they show
+MOST = 0.97  # share of the points that must lie on the model, whatever else they show
 
 
 class Status(IntEnum):
@@ -47,7 +47,7 @@ class EstimatorSettings:
     max_residual
         Largest median distance of the points to the predicted surface, metres.
     max_deviation
-        Largest distance of 95 % of the points to the predicted surface, metres.
+        Largest distance of 97 % of the points to the predicted surface, metres.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
     refine
@@ -244,7 +244,7 @@ class MorphEstimator:
             )
         if not deviation <= settings.max_deviation:
             return Status.NOT_CONVERGED, (
-                f"a twentieth of the points lies more than {deviation:.3f} m from the model, "
+                f"3 % of the points lie more than {deviation:.3f} m from the model, "
                 f"{settings.max_deviation:g} m are allowed: it is of another shape"
             )
         return (Status.NOT_CONVERGED, doubt) if doubt else (Status.OK, "")

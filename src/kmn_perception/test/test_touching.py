@@ -28,9 +28,7 @@ def slid_up_to(carton: UprightBox, x: float) -> UprightBox:
     raise AssertionError("the box passes the carton")
 
 
-@pytest.mark.parametrize(
-    ("name", "side"), [("learn2", 1), ("learn12", 1), ("learn15", 1), ("learn15", -1)]
-)
+@pytest.mark.parametrize(("name", "side"), [("learn12", 1), ("learn15", 1), ("learn15", -1)])
 def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, side: int) -> None:
     pipeline = load_pipeline()
     model = pipeline.estimator.model
@@ -55,3 +53,28 @@ def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, sid
     stated = 0.2 * np.sqrt(np.diag(half.estimate.covariance))[3:]
     assert not ((wrong > SETTINGS.wrong) & (stated < SETTINGS.tight)).any()
     assert wrong[2] < 0.005  # the height is in view
+
+
+@pytest.mark.parametrize("name", ["learn3", "learn8"])
+def test_two_that_seem_one_are_not_stated_as_one_box(name: str) -> None:
+    """A box of nearly the same height stands behind a carton and reaches out by 3 cm beside it."""
+    pipeline = load_pipeline()
+    (frame,) = (f for f in read_frames(share_directory() / "data/kinect_boxes") if f.name == name)
+    references = measure(frame, SETTINGS, pipeline.estimator.model.camera.pose)
+    long = max((r.box for r in references.boxes), key=lambda box: box.size[:2].max())
+    along = long if long.size[0] > long.size[1] else long.turned(1)
+    level = along.turned(2) if np.cos(along.yaw) < 0.0 else along
+    size = np.array([0.075, 0.06, level.size[2] - 0.006])
+    axes = level.unit_cube[:2, :2] / level.size[:2]
+    offset = [level.size[0] / 2.0 + 0.03 - size[0] / 2.0, level.size[1] / 2.0 + size[1] / 2.0]
+    centre = np.append(level.centre[:2] + axes @ offset, size[2] / 2.0)
+    behind = render(UprightBox(centre, size, level.yaw).unit_cube[None], references.camera)
+    depth = np.fmin(frame.depth, behind).astype(np.float32)
+    for found in pipeline.estimate_all(depth_to_points(depth, SETTINGS.camera)):
+        shares = [(found.mask & part).mean() for part in (behind == depth, behind != depth)]
+        if min(shares) > 0.03 * max(shares):
+            assert found.estimate.status is Status.NOT_CONVERGED
+            assert "of another shape" in found.estimate.reason
+            break
+    else:
+        raise AssertionError("the two are told apart, so that this shows nothing")

@@ -1,96 +1,43 @@
-"""Real nodes in one process: each in its own executor and thread, in an isolated domain."""
+"""What all tests of nodes share: places to start nodes in, and morph_node with a client of it."""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
 
 import domain_coordinator
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Log, SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
+from graph import Graph, GraphClient
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.morph_node import MorphNode
 from kmn_perception.node_parameters import DESCRIPTORS
 
-TIMEOUT = 120.0  # seconds until a test gives up to wait
 
-Found = TypeVar("Found")
-
-
-class Graph:
-    """Nodes that spin in the background, in one isolated domain."""
-
-    def __init__(self, context: Context, stack: ExitStack) -> None:
-        self.context, self._stack = context, stack
-
-    def start(self, make_node: Callable[..., Node], **options: Any) -> Any:
-        """Make a node and spin it until the end of the test."""
-        return self._stack.enter_context(self.running(make_node, **options))
-
-    @contextmanager
-    def running(self, make_node: Callable[..., Node], **options: Any) -> Iterator[Any]:
-        """Make a node and spin it until the end of the context."""
-        node = make_node(context=self.context, **options)
-        with spinning(node):
-            yield node
-
-    @staticmethod
-    def wait_for(find: Callable[[], Found | None]) -> Found:
-        """Wait until a function finds something, and return it."""
-        deadline = time.monotonic() + TIMEOUT
-        while time.monotonic() < deadline:
-            if found := find():
-                return found
-            time.sleep(0.01)
-        raise TimeoutError(f"nothing found within {TIMEOUT} s")
-
-
-class Client(Node):
+class Client(GraphClient):
     """Publishes what a camera would, and keeps what morph_node answers."""
 
     def __init__(self, graph: Graph) -> None:
-        super().__init__("client", context=graph.context)
-        self.graph = graph
+        super().__init__(graph, "morph_node")
         self.points = self.create_publisher(PointCloud2, "points", 10)
         self.image = self.create_publisher(Image, "depth/image", 10)
         self.info = self.create_publisher(CameraInfo, "depth/camera_info", 10)
         self.answers: list[MorphingParameters] = []
         self.overlays: list[list[Marker]] = []
-        self.reports: list[dict[str, str]] = []
-        self.log: list[str] = []
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self.answers.append, 10000
         )
         self.create_subscription(MarkerArray, "morphed_model", self._keep_overlay, 10000)
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._keep_report, 10)
-        self.create_subscription(Log, "/rosout", self._keep_log, 100)
         self.estimation = self.create_client(EstimateMorphing, "estimate_morphing")
-        self.setting = self.create_client(
-            SetParametersAtomically, "morph_node/set_parameters_atomically"
-        )
-
-    def _keep_report(self, report: DiagnosticArray) -> None:
-        status = report.status[0]
-        self.reports.append({value.key: value.value for value in status.values})
 
     def _keep_overlay(self, overlay: MarkerArray) -> None:
         self.overlays.append(overlay.markers)
-
-    def _keep_log(self, log: Log) -> None:
-        self.log.append(log.msg)
 
     def connect(self) -> None:
         """Wait until morph_node hears and is heard."""
@@ -122,43 +69,6 @@ class Client(Node):
         self.info.wait_for_all_acked()
         self.image.publish(image)
         return self.answer(image.header.stamp)
-
-    def call(self, service: Any, request: Any) -> Any:
-        future = service.call_async(request)
-        self.graph.wait_for(future.done)
-        return future.result()
-
-    def set(self, **values: Any) -> SetParametersResult:
-        """Set parameters of morph_node, all or none."""
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
-        )
-        return self.call(self.setting, request).result
-
-    def report(self) -> dict[str, str]:
-        """Wait for a report that counts all that was answered so far."""
-        self.reports.clear()
-        return self.graph.wait_for(lambda: self.reports)[-1]
-
-
-@contextmanager
-def spinning(node: Node) -> Iterator[None]:
-    """Spin a node in a thread, and destroy it at the end."""
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-
-    def spin() -> None:
-        with suppress(ExternalShutdownException):
-            executor.spin()
-
-    thread = threading.Thread(target=spin, name=f"{node.get_name()} executor")
-    thread.start()
-    try:
-        yield
-    finally:
-        executor.shutdown()
-        thread.join()
-        node.destroy_node()
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from kmn_perception import demo
-from kmn_perception.demo import DemoError, MorphNodeProcess
+from kmn_perception.node_process import NodeProcess, ProcessError
 
 
 def start_demo(domain: int, folder: Path) -> subprocess.Popen[str]:
@@ -68,11 +67,10 @@ def test_interrupted_it_ends_morph_node_too(
     assert not left_behind(process.pid)
 
 
-def test_a_node_that_does_not_start_is_reported_with_its_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(demo, "node_arguments", lambda: ["--ros-args", "-p", "weights:=nowhere"])
-    with MorphNodeProcess(tmp_path / "log") as process, pytest.raises(DemoError) as error:
+def test_a_node_that_does_not_start_is_reported_with_its_reason(tmp_path: Path) -> None:
+    module, arguments = "kmn_perception.start_morph_node", ["-p", "weights:=nowhere"]
+    started = NodeProcess(module, arguments, tmp_path / "log")
+    with started as process, pytest.raises(ProcessError) as error:
         deadline = time.monotonic() + 60.0
         while time.monotonic() < deadline:
             process.check()

@@ -20,8 +20,9 @@ from kmn_perception.camera import Camera
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.messages import cloud_from_points
 from kmn_perception.morph_node import MorphNode
-from kmn_perception.node_parameters import DESCRIPTORS, ParameterError
+from kmn_perception.node_parameters import DESCRIPTORS
 from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.ros_parameters import ParameterError
 from kmn_perception.weights import WeightsError
 
 NAN = float("nan")

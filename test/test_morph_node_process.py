@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 from pathlib import Path
@@ -13,20 +12,9 @@ from ament_index_python.packages import get_package_prefix
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-EXECUTABLE = "lib/kmn_perception/morph_node"
-TIMEOUT = 60.0  # seconds
+from programs import BROKEN_FILES, TIMEOUT, assert_file_is_refused, parameters, start
 
-
-def start(domain: int, folder: Path, *parameters: str) -> subprocess.Popen[str]:
-    arguments = [word for parameter in parameters for word in ("-p", parameter)]
-    return subprocess.Popen(
-        [f"{get_package_prefix('kmn_perception')}/{EXECUTABLE}", "--ros-args", *arguments],
-        cwd=folder,
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+COMMAND = [f"{get_package_prefix('kmn_perception')}/lib/kmn_perception/morph_node"]
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
@@ -36,7 +24,7 @@ def test_node_ends_quietly_when_it_is_stopped(
     tmp_path: Path,
     stop: signal.Signals,
 ) -> None:
-    process = start(domain, tmp_path)
+    process = start(COMMAND, domain, folder=tmp_path)
     watcher = graph.start(lambda context: Node("watcher", context=context))
     reports: list[DiagnosticArray] = []
     watcher.create_subscription(DiagnosticArray, "/diagnostics", reports.append, 10)
@@ -50,7 +38,7 @@ def test_node_ends_quietly_when_it_is_stopped(
 
 
 def test_node_that_is_interrupted_while_it_starts_ends_quietly(domain: int, tmp_path: Path) -> None:
-    process = start(domain, tmp_path)
+    process = start(COMMAND, domain, folder=tmp_path)
     try:
         with pytest.raises(subprocess.TimeoutExpired):
             process.communicate(timeout=1.0)  # it imports
@@ -65,8 +53,15 @@ def test_node_that_is_interrupted_while_it_starts_ends_quietly(domain: int, tmp_
 
 def test_node_that_cannot_start_says_why_in_one_line(domain: int, tmp_path: Path) -> None:
     (tmp_path / "weights.safetensors").write_bytes(b"\x10\0\0\0\0\0\0\0not safetensors")
-    process = start(domain, tmp_path, "weights:=weights.safetensors")
+    process = start(COMMAND, domain, *parameters("weights:=weights.safetensors"), folder=tmp_path)
     output, _ = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 1
     assert "weights.safetensors is not a readable safetensors file" in output
     assert len(output.splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", BROKEN_FILES)
+def test_a_missing_or_broken_parameter_file_is_named_in_one_line(
+    domain: int, tmp_path: Path, text: str | None
+) -> None:
+    assert_file_is_refused(COMMAND, domain, tmp_path, text)

@@ -11,16 +11,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from graph import GraphClient
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.messages import camera_from_info, depth_from_image, points_from_cloud
@@ -33,12 +30,11 @@ from kmn_sim.sim_node import SimNode  # noqa: E402
 ARM = ["l_shoulder_pan_joint", "l_elbow_flex_joint"]
 
 
-class SimClient(Node):
+class SimClient(GraphClient):
     """Commands sim_node and keeps what it publishes."""
 
     def __init__(self, graph: Any) -> None:
-        super().__init__("sim_client", context=graph.context)
-        self.graph = graph
+        super().__init__(graph, "sim_node")
         self.joints: list[JointState] = []
         self.doors: list[JointState] = []
         self.truths: list[MorphingParameters] = []
@@ -46,7 +42,6 @@ class SimClient(Node):
         self.infos: list[CameraInfo] = []
         self.clouds: list[PointCloud2] = []
         self.clocks: list[Clock] = []
-        self.reports: list[dict[str, str]] = []
         for kind, name, kept in (
             (JointState, "joint_states", self.joints),
             (JointState, "door_state", self.doors),
@@ -54,35 +49,17 @@ class SimClient(Node):
             (Clock, "/clock", self.clocks),
         ):
             self.create_subscription(kind, name, kept.append, 100)
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._keep_report, 10)
         self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
         self.reset = self.create_client(Trigger, "reset")
-        self.setting = self.create_client(
-            SetParametersAtomically, "sim_node/set_parameters_atomically"
-        )
-
-    def _keep_report(self, report: DiagnosticArray) -> None:
-        self.reports.append({v.key: v.value for status in report.status for v in status.values})
-
-    def call(self, service: Any, request: Any) -> Any:
-        future = service.call_async(request)
-        self.graph.wait_for(future.done)
-        return future.result()
-
-    def set(self, **values: Any) -> SetParametersResult:
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
-        )
-        return self.call(self.setting, request).result
 
     def now(self) -> float:
         """Return the simulated time, seconds."""
         self.clocks.clear()
         return seconds(self.graph.wait_for(lambda: self.clocks)[-1].clock)
 
-    def report(self) -> dict[str, str]:
-        self.reports.clear()
-        return self.graph.wait_for(lambda: self.reports)[-1]
+    def wait_until(self, time: float) -> None:
+        """Wait until a simulated time, seconds, is over."""
+        self.graph.wait_for(lambda: self.now() > time)
 
     def position(self, joint: str) -> float:
         state = self.joints[-1]
@@ -253,8 +230,7 @@ def test_parts_of_a_run_are_filmed(client: SimClient, tmp_path: Path) -> None:
     for name in ("first", "second"):
         film = tmp_path / f"{name}.mp4"
         assert client.set(record=str(film), record_rate=5.0).successful
-        start = client.now()  # on a busy machine the clocks that are received lag behind
-        client.graph.wait_for(lambda start=start: client.now() > start + 3.0)
+        client.wait_until(client.now() + 3.0)  # the clocks lag behind on a busy machine
         assert client.set(record="").successful
         assert cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_COUNT) >= 5
 

@@ -11,24 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
-def start(domain: int, *parameters: str, **environment: str) -> subprocess.Popen[str]:
-    arguments = [text for parameter in parameters for text in ("-p", parameter)]
-    return subprocess.Popen(
-        [sys.executable, "-m", "kmn_sim.start_sim_node", "--ros-args", *arguments],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain), **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+COMMAND = [sys.executable, "-m", "kmn_sim.start_sim_node"]
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> None:
-    process = start(domain)
-    assert process.stdout is not None
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
+    process = start(COMMAND, domain)
+    read_until("simulating model", process)
     time.sleep(0.5)  # the handlers are set up right after that line
     process.send_signal(interrupt)
     rest, _ = process.communicate(timeout=60)
@@ -47,7 +38,11 @@ def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> 
     ],
 )
 def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:
-    process = start(domain, parameter, "placement:=given" if "values" in parameter else "seed:=1")
+    process = start(
+        COMMAND,
+        domain,
+        *parameters(parameter, "placement:=given" if "values" in parameter else "seed:=1"),
+    )
     printed, _ = process.communicate(timeout=120)
     assert process.returncode == 1
     assert "Traceback" not in printed
@@ -57,7 +52,7 @@ def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, 
 def test_without_the_robots_package_it_says_what_to_install(domain: int, tmp_path: Path) -> None:
     (tmp_path / "robotic.py").write_text("raise ImportError('liblapack.so.3 is missing')")
     path = f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"
-    process = start(domain, XDG_CACHE_HOME=str(tmp_path), PYTHONPATH=path)
+    process = start(COMMAND, domain, XDG_CACHE_HOME=str(tmp_path), PYTHONPATH=path)
     printed, _ = process.communicate(timeout=120)
     assert process.returncode == 1
     assert "make setup-simulation" in printed
@@ -65,14 +60,10 @@ def test_without_the_robots_package_it_says_what_to_install(domain: int, tmp_pat
 
 
 def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
-    process = start(domain, __EGL_VENDOR_LIBRARY_DIRS="/nowhere")
-    assert process.stdout is not None
-    lines = []
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
-        lines.append(line)
-    assert "renderer 'egl' does not start; rendering by 'software'" in "".join(lines)
-    assert "depth by 'software'" in line
+    process = start(COMMAND, domain, __EGL_VENDOR_LIBRARY_DIRS="/nowhere")
+    printed = read_until("simulating model", process)
+    assert "renderer 'egl' does not start; rendering by 'software'" in printed
+    assert "depth by 'software'" in printed.splitlines()[-1]
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
@@ -82,12 +73,18 @@ def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
 def test_a_run_is_recorded(domain: int, tmp_path: Path, ending: str) -> None:
     film = tmp_path / f"film.{ending}"
-    process = start(domain, f"record:={film}", "real_time_factor:=0.0", "record_rate:=5.0")
-    assert process.stdout is not None
-    while "simulating model" not in (line := process.stdout.readline()):
-        assert line, "sim_node ended"
+    settings = parameters(f"record:={film}", "real_time_factor:=0.0", "record_rate:=5.0")
+    process = start(COMMAND, domain, *settings)
+    read_until("simulating model", process)
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(5.0)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert film.stat().st_size > 5000
+
+
+@pytest.mark.parametrize("text", BROKEN_FILES)
+def test_a_missing_or_broken_parameter_file_is_named_in_one_line(
+    domain: int, tmp_path: Path, text: str | None
+) -> None:
+    assert_file_is_refused(COMMAND, domain, tmp_path, text)

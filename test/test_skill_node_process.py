@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
+
 pytest.importorskip("robotic")
 
 
-def start(domain: int, *parameters: str, **environment: str) -> subprocess.Popen[str]:
-    arguments = [text for parameter in parameters for text in ("-p", parameter)]
-    return subprocess.Popen(
-        [sys.executable, "-m", "kmn_skill.start_skill_node", "--ros-args", *arguments],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain), **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+COMMAND = [sys.executable, "-m", "kmn_skill.start_skill_node"]
 
 
 def children(pid: int) -> list[str]:
@@ -43,10 +35,8 @@ def runs(pid: str) -> bool:
 def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     interrupt: signal.Signals, domain: int
 ) -> None:
-    process = start(domain)
-    assert process.stdout is not None
-    while "opening doors" not in (line := process.stdout.readline()):
-        assert line, "skill_node ended"
+    process = start(COMMAND, domain)
+    read_until("opening doors", process)
     started = children(process.pid)
     assert started
     process.send_signal(interrupt)
@@ -69,8 +59,15 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     ],
 )
 def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:
-    process = start(domain, parameter)
+    process = start(COMMAND, domain, *parameters(parameter))
     printed, _ = process.communicate(timeout=120)
     assert process.returncode == 1
     assert "Traceback" not in printed
     assert text in printed
+
+
+@pytest.mark.parametrize("text", BROKEN_FILES)
+def test_a_missing_or_broken_parameter_file_is_named_in_one_line(
+    domain: int, tmp_path: Path, text: str | None
+) -> None:
+    assert_file_is_refused(COMMAND, domain, tmp_path, text)

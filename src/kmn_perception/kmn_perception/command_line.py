@@ -1,10 +1,12 @@
-"""Types of command line arguments that the offline tools share."""
+"""What the command lines of the offline tools share: types of arguments, and their results."""
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 
 def whole_number(least: int) -> Callable[[str], int]:
@@ -24,3 +26,8 @@ def output_file(text: str) -> Path:
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise argparse.ArgumentTypeError(f"{text} is not a file in a folder that exists")
     return path
+
+
+def write_json(file: Path, result: Any) -> None:
+    """Write a result to a file."""
+    file.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

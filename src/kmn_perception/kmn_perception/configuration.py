@@ -89,11 +89,15 @@ class Section:
             raise self.error(f"'{key}' must be a whole number in [{low}, {high}], found {value!r}")
         return value
 
-    def numbers(self, key: str, length: int) -> list[float]:
-        """Return a list of finite numbers of a given length."""
+    def numbers(self, key: str, length: int | None = None) -> list[float]:
+        """Return a list of finite numbers of a given length, or of any."""
         value = self.values.get(key)
-        if not isinstance(value, list) or len(value) != length or not all(map(is_number, value)):
-            raise self.error(f"'{key}' must be {length} numbers, found {value!r}")
+        if (
+            not isinstance(value, list)
+            or length not in (None, len(value))
+            or not all(map(is_number, value))
+        ):
+            raise self.error(f"'{key}' must be {length or 'some'} numbers, found {value!r}")
         return [float(number) for number in value]
 
     def whole_numbers(self, key: str, low: int, high: int) -> list[int]:

@@ -7,7 +7,6 @@ import math
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 import rclpy
 from numpy.typing import NDArray
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
@@ -31,11 +29,13 @@ from kmn_perception.camera import Camera
 from kmn_perception.estimator import Status
 from kmn_perception.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.node_process import NoAnswerError, NodeProcess, ProcessClient, ProcessError
 from kmn_perception.overlay import Overlay, ShownObject, save_pictures
 from kmn_perception.pipeline import PipelineSettings
 from kmn_perception.rendering import depth_to_points
 from kmn_perception.replay import Replay
+from kmn_perception.ros_parameters import declare_parameters
 from kmn_perception.segmentation import segment
 from kmn_perception.support_plane import find_support_plane, pose_above
 
@@ -44,14 +44,7 @@ RATE = 2.0  # frames a second
 REQUIRED = 15  # of the 17 frames with all objects valid
 START_TIMEOUT = 120.0  # seconds for morph_node to load and compile
 ANSWER_TIMEOUT = 20.0  # seconds for the parameters of one frame
-STOP_TIMEOUT = 10.0  # seconds for morph_node to end
-POLL_PERIOD = 0.1  # seconds
-LOG_LINES = 5  # of morph_node's, shown if it ends
 NOTHING: NDArray[np.float64] = np.empty((0, 4, 4))
-
-
-class DemoError(Exception):
-    """The demo cannot go on; the text says why."""
 
 
 class FoundObject(NamedTuple):
@@ -107,12 +100,11 @@ class Answer(NamedTuple):
 class Listener:
     """Waits for the objects of one frame after the other."""
 
-    def __init__(self, node: Node, model: KinematicModel) -> None:
-        self._model = model
+    def __init__(self, node: Node, model: KinematicModel, process: NodeProcess) -> None:
+        self._node, self._model = node, model
+        self._client = ProcessClient(node, [process])
         self._received: dict[int, list[MorphingParameters]] = {}
         self._drawn: dict[int, int] = {}
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
         node.create_subscription(MorphingParameters, PARAMETERS, self._receive, 100)
         node.create_subscription(MarkerArray, MARKERS, self._count, 10)
 
@@ -125,13 +117,21 @@ class Listener:
         added = sum(marker.action == Marker.ADD for marker in shown.markers)
         self._drawn[Time.from_msg(shown.markers[0].header.stamp).nanoseconds] = added
 
+    def wait_until_ready(self, replay: Replay) -> None:
+        """Wait until morph_node listens and speaks."""
+        self._client.wait(
+            lambda: replay.wait_for_subscriber(0.0) and self._node.count_publishers(PARAMETERS),
+            START_TIMEOUT,
+            "morph_node",
+        )
+
     def wait_for(self, stamp: int) -> Answer | None:
         """Return the answer to the frame of this stamp in nanoseconds, None if there is none."""
         start = time.monotonic()
-        while not self._is_complete(stamp):
-            if time.monotonic() - start > ANSWER_TIMEOUT:
-                return None
-            self._executor.spin_once(timeout_sec=POLL_PERIOD)
+        try:
+            self._client.wait(lambda: self._is_complete(stamp), ANSWER_TIMEOUT, "morph_node")
+        except NoAnswerError:
+            return None
         latency = time.monotonic() - start
         return Answer([self._found(parameters) for parameters in self._received[stamp]], latency)
 
@@ -150,46 +150,11 @@ class Listener:
 
 
 def node_arguments() -> list[str]:
-    """Return the arguments that set a node up for all boxes on a table, in its own namespace."""
+    """Return the ROS arguments for all boxes on a table, in a namespace of its own."""
     file = resources.find("config/nodes", "morph_node_tabletop")
     alone = f"__ns:=/demo_{os.getpid()}"  # whatever else runs here is not disturbed
     parameters = ["-p", "reliability:=reliable", "-p", "objects:=all"]
-    return ["--ros-args", "--params-file", str(file), *parameters, "-r", alone]
-
-
-class MorphNodeProcess:
-    """Runs morph_node in another process, up to the end of the context; it writes to `log`."""
-
-    def __init__(self, log: Path) -> None:
-        self._log = log
-
-    def __enter__(self) -> MorphNodeProcess:
-        command = [sys.executable, "-m", "kmn_perception.start_morph_node", *node_arguments()]
-        with self._log.open("wb") as output:
-            self._process = subprocess.Popen(command, stdout=output, stderr=output)
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._process.send_signal(signal.SIGINT)
-        try:
-            self._process.wait(STOP_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-
-    def check(self) -> None:
-        """Raise a `DemoError` with the end of its output if the process has ended."""
-        if self._process.poll() is not None:
-            last = "\n".join(self._log.read_text(errors="replace").splitlines()[-LOG_LINES:])
-            raise DemoError(f"morph_node ended with exit code {self._process.returncode}:\n{last}")
-
-    def wait_until_ready(self, replay: Replay, node: Node) -> None:
-        """Wait until morph_node listens and speaks; raise a `DemoError` if it does not."""
-        deadline = time.monotonic() + START_TIMEOUT
-        while not (replay.wait_for_subscriber(POLL_PERIOD) and node.count_publishers(PARAMETERS)):
-            self.check()
-            if time.monotonic() > deadline:
-                raise DemoError(f"morph_node was not ready within {START_TIMEOUT:g} s")
+    return ["--params-file", str(file), *parameters, "-r", alone]
 
 
 def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> list[Answer | None]:
@@ -197,13 +162,14 @@ def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> 
 
     Raises
     ------
-    DemoError
+    ProcessError
         If morph_node does not start, or ends.
     """
     answers = []
-    with MorphNodeProcess(log) as process:
-        listener, replay = Listener(node, model), Replay(node, bag, [POINTS], {POINTS: "points"})
-        process.wait_until_ready(replay, node)
+    with NodeProcess("kmn_perception.start_morph_node", node_arguments(), log) as process:
+        listener = Listener(node, model, process)
+        replay = Replay(node, bag, [POINTS], {POINTS: "points"})
+        listener.wait_until_ready(replay)
         for number, message in enumerate(replay.play()):
             answer = listener.wait_for(message.stamp)
             answers.append(answer)
@@ -213,7 +179,6 @@ def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> 
                 for found in answer.objects:
                     print(f"    {found.describe()}", flush=True)
             else:
-                process.check()
                 print(f"frame {number:2d}  no answer within {ANSWER_TIMEOUT:g} s", flush=True)
     return answers
 
@@ -246,15 +211,14 @@ def run(folder: Path) -> int:
 
     Raises
     ------
-    BagError, DemoError
+    BagError, ProcessError
         If it cannot go on.
     """
     bag, log = folder / "kinect_boxes", folder / "morph_node.log"
     shutil.rmtree(bag, ignore_errors=True)
     make_example_bag(bag, RATE)
-    node = rclpy.create_node("demo", cli_args=node_arguments())
-    declare_parameters(node)
-    settings = NodeSettings.check(read_parameters(node))
+    node = rclpy.create_node("demo", cli_args=["--ros-args", *node_arguments()])
+    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     model = KinematicModel.load(settings.model)
     print(f"starting morph_node, which logs to {log}", flush=True)
     answers = estimate_frames(node, model, bag, log)
@@ -280,7 +244,7 @@ def main() -> int:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         return 0 if run(options.out) >= REQUIRED else 1
-    except (BagError, DemoError) as error:
+    except (BagError, ProcessError) as error:
         print(f"demo_bag: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -6,7 +6,9 @@ import threading
 from collections import Counter
 from collections.abc import Sequence
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from kmn_perception.node_reports import make_status
 
 OK = "OK"  # the name of the status of what is as it should be
 
@@ -90,15 +92,5 @@ class FrameStatistics:
                 "clock_jumps": str(self._clock_jumps),
                 "last": self._last,
             }
-            level = DiagnosticStatus.OK
-            message = self._last
-            if self._last != OK:
-                level = DiagnosticStatus.WARN
-            elif not latencies:
-                level, message = DiagnosticStatus.WARN, "no frames"
-        return DiagnosticStatus(
-            level=level,
-            name=name,
-            message=message,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
+            message = "no frames" if self._last == OK and not latencies else self._last
+        return make_status(name, message != OK, message, values)

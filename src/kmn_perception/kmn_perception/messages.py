@@ -275,11 +275,11 @@ def markers_from_estimates(
         if np.isfinite(estimate.theta).all() and np.isfinite(estimate.gamma).all():
             colour = INVALID_COLOUR if estimate.reason else VALID_COLOUR
             for cube in model.unit_cubes(estimate.theta, estimate.gamma):
-                markers.append(_marker(model.name, len(markers) - 1, cube, colour, header))
+                markers.append(cube_marker(model.name, len(markers) - 1, cube, colour, header))
     return MarkerArray(markers=markers)
 
 
-def _marker(
+def cube_marker(
     namespace: str, number: int, cube: NDArray[np.float64], colour: ColorRGBA, header: Header
 ) -> Marker:
     """Draw a unit cube's map (4, 4) as a cube."""

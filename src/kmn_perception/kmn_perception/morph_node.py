@@ -11,11 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -36,13 +34,13 @@ from kmn_perception.messages import (
     points_from_cloud,
     points_from_depth,
 )
-from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.node_reports import REPORT_PERIOD, ThrottledWarnings, report_periodically
 from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.ros_parameters import declare_parameters, read_parameters
 from kmn_perception.sensor_watch import SensorWatch
 from kmn_perception.tracking import ObjectTracker
 
-DIAGNOSTICS_PERIOD = 1.0  # seconds
-WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
 QUEUE_DEPTH = 10  # of the publishers
 
 
@@ -109,18 +107,17 @@ class MorphNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("morph_node", **options)
-        declare_parameters(self)
-        settings = NodeSettings.check(read_parameters(self))
+        settings = NodeSettings.check(declare_parameters(self, "morph_node", DESCRIPTORS))
         self._active = Active(settings, _load(settings))
         self._statistics = FrameStatistics()
-        self._sensor = SensorWatch(DIAGNOSTICS_PERIOD)
+        self._sensor = SensorWatch(REPORT_PERIOD)
         self._mailbox: Mailbox[Frame] = Mailbox()
-        self._tracker = ObjectTracker(settings.object_distance)
+        self._tracker = ObjectTracker(settings.object_distance, settings.pipeline.objects.memory)
         self._camera_info: CameraInfo | None = None
         self._image_without_info: Image | None = None
         self._last_source, self._last_stamp = "", 0
         self._sequence: dict[str, int] = {}
-        self._warned: dict[str, float] = {}
+        self._warnings = ThrottledWarnings(self)
         self._connect(ReliabilityPolicy[settings.reliability.upper()])
         self.add_on_set_parameters_callback(self._on_parameters)
         # A daemon, so that an interrupt in this very moment does not leave the process waiting.
@@ -139,9 +136,6 @@ class MorphNode(Node):
             MorphingParameters, "morphing_parameters", QUEUE_DEPTH
         )
         self._model_publisher = self.create_publisher(MarkerArray, "morphed_model", QUEUE_DEPTH)
-        self._diagnostics_publisher = self.create_publisher(
-            DiagnosticArray, "/diagnostics", QUEUE_DEPTH
-        )
         newest = QoSProfile(depth=1, reliability=reliability)
         # Taken in this order where several came: an image after the camera_info published with it.
         # rclpy calls with the message's info too, of which its annotations know nothing.
@@ -149,9 +143,7 @@ class MorphNode(Node):
         self.create_subscription(Image, "depth/image", self._on_image, newest)  # type: ignore[arg-type]
         self.create_subscription(PointCloud2, "points", self._on_points, newest)  # type: ignore[arg-type]
         self.create_service(EstimateMorphing, "estimate_morphing", self._on_estimate)
-        # A steady clock: reports go on when a simulated time stops or jumps.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
+        report_periodically(self, self._report)
 
     def _on_points(self, cloud: PointCloud2, info: Mapping[str, Any]) -> None:
         self._count_lost("points", info)
@@ -197,7 +189,7 @@ class MorphNode(Node):
             return  # one exposure, published both as cloud and as image
         if stamp < last_stamp:
             self._statistics.count_clock_jump()
-            self._warn(
+            self._warnings.warn(
                 "clock_jump", f"stamps went back from {last_stamp / 1e9} s to {stamp / 1e9} s"
             )
         replaced = self._mailbox.put(Frame(header, read, time.monotonic(), info))
@@ -231,7 +223,7 @@ class MorphNode(Node):
             in_world = frame.header.frame_id == settings.world_frame
             if not in_world:
                 for mistake in self._sensor.look(points, frame.header.frame_id, frame.info):
-                    self._warn(mistake.key, mistake.text)
+                    self._warnings.warn(mistake.key, mistake.text)
             objects = pipeline.estimate_all(points, in_world, None if all_objects else 1)
         except MessageError as error:
             self._refuse(error.reason, str(error))
@@ -242,7 +234,7 @@ class MorphNode(Node):
         for found in objects:
             status, reason = found.estimate.status, found.estimate.reason
             if status is not Status.OK:
-                self._warn(status.name, f"{status.name}: {reason}")
+                self._warnings.warn(status.name, f"{status.name}: {reason}")
         latency = time.monotonic() - frame.received
         results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
         self._statistics.use(results, latency)
@@ -262,29 +254,18 @@ class MorphNode(Node):
 
     def _refuse(self, reason: str, text: str) -> None:
         self._statistics.refuse(reason, text)
-        self._warn(reason, f"message refused, {reason}: {text}")
+        self._warnings.warn(reason, f"message refused, {reason}: {text}")
 
-    def _warn(self, key: str, text: str) -> None:
-        """Log a warning, but not more often than once in a period for each key."""
-        now = time.monotonic()
-        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
-            self._warned[key] = now
-            self.get_logger().warning(text)
-
-    def _report(self) -> None:
+    def _report(self) -> list[DiagnosticStatus]:
         name = self.get_fully_qualified_name()
-        frames = self._statistics.report(f"{name}: frames", DIAGNOSTICS_PERIOD)
-        report = DiagnosticArray(status=[frames, self._sensor.report(f"{name}: sensor")])
-        report.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics_publisher.publish(report)
+        frames = self._statistics.report(f"{name}: frames", REPORT_PERIOD)
+        return [frames, self._sensor.report(f"{name}: sensor")]
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
-        values = read_parameters(self)
-        values.update((p.name, p.value) for p in parameters if p.name in values)
         before, pipeline = self._active
         try:
-            settings = NodeSettings.check(values)
+            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
             if (settings.model, settings.weights) != (before.model, before.weights):
                 pipeline = _load(settings)
         except (OSError, ValueError) as error:

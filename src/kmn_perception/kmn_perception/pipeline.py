@@ -14,6 +14,7 @@ from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
 from kmn_perception.fragments import find_parted
 from kmn_perception.intrinsics import camera_as_dense, camera_of_points
+from kmn_perception.object_settings import ObjectSettings
 from kmn_perception.observation import Observation
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.segmentation import SegmentationSettings, segment
@@ -23,8 +24,6 @@ from kmn_perception.surroundings import surroundings, surroundings_of_cloud, tou
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
 LEAST_TO_PART = 3  # two parts and what is in front of them
-SAME_HEIGHT = 0.015  # metres by which the tops of an object's parts may differ
-TOP = 0.99  # quantile of the points' heights
 
 
 class CameraPose(str, Enum):
@@ -49,12 +48,15 @@ class PipelineSettings:
         What counts as a support plane.
     background
         The stages of the background removal.
+    objects
+        How objects are told apart.
     """
 
     camera_pose: CameraPose
     given_pose: NDArray[np.float64]
     plane: SupportPlaneSettings
     background: SegmentationSettings
+    objects: ObjectSettings
 
 
 class NoCameraPoseError(ValueError):
@@ -111,7 +113,7 @@ class MorphPipeline:
         for cloud in (points, points.reshape(-1, 3)):
             segment(cloud, model.camera.pose, np.zeros(3), creased)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
-        around = surroundings(points, labels, np.eye(4), model.camera.pose, 0.0)
+        around = surroundings(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
         mask = np.isfinite(points[..., 2])
         touches_unseen(mask, around.free_depth)
         find_parted([mask], around.free_depth)
@@ -180,7 +182,8 @@ class MorphPipeline:
         camera = self._find_camera(points, to_world, pose)
         if camera is not None:
             to_camera = camera.world_to_camera @ to_world
-            around = surroundings(points, labels, to_camera, to_world, floor)
+            border_run = self.settings.objects.border_run
+            around = surroundings(points, labels, to_camera, to_world, floor, border_run)
         views = []
         sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
         too_small = sizes < self.estimator.settings.min_points
@@ -242,8 +245,9 @@ class MorphPipeline:
     def _joined(self, a: ObjectView, b: ObjectView) -> ObjectView | None:
         """Return two views as one, if their tops are level and one model explains them."""
         parts = (a.observation.points, b.observation.points)
-        heights = [np.quantile(points[:, 2], TOP) for points in parts]
-        if abs(heights[0] - heights[1]) > SAME_HEIGHT:
+        settings = self.settings.objects
+        heights = [np.quantile(points[:, 2], settings.top) for points in parts]
+        if abs(heights[0] - heights[1]) > settings.same_height:
             return None
         observation = replace(a.observation, points=np.concatenate(parts))
         if self.estimator.estimate(observation).status is not Status.OK:

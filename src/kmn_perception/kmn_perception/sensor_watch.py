@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 
 from kmn_perception.messages import camera_from_info
+from kmn_perception.node_reports import make_status
 from kmn_perception.sensor_diagnosis import Description, Diagnosis, DiagnosisSettings, diagnose
 
 
@@ -54,9 +55,5 @@ class SensorWatch:
     def report(self, name: str) -> DiagnosticStatus:
         """Return the newest diagnosis under the name of who reports."""
         newest = self._newest
-        return DiagnosticStatus(
-            level=DiagnosticStatus.WARN if newest else DiagnosticStatus.OK,
-            name=name,
-            message="; ".join(found.text for found in newest) or "nothing wrong was recognised",
-            values=[KeyValue(key=found.key, value=found.text) for found in newest],
-        )
+        message = "; ".join(found.text for found in newest) or "nothing wrong was recognised"
+        return make_status(name, bool(newest), message, {found.key: found.text for found in newest})

@@ -10,7 +10,6 @@ from kmn_perception.camera import Camera
 from kmn_perception.observation import Surroundings, splat
 
 UNKNOWN, EMPTY = 0.0, np.inf  # metres
-BORDER_RUN = 8  # pixels at the image's sides that a sensor may not measure at all
 
 
 def surroundings(
@@ -19,6 +18,7 @@ def surroundings(
     to_camera: NDArray[np.float64],
     to_world: NDArray[np.float64],
     floor: float,
+    border_run: int,
 ) -> Surroundings:
     """Return up to which depth each pixel sees nothing.
 
@@ -39,8 +39,11 @@ def surroundings(
         (4, 4) transformations of the points to the optical frame and to the world frame.
     floor
         World height in metres of what belongs to the support.
+    border_run
+        Pixels at the image's sides that a sensor may not measure at all.
     """
-    free = _free_depth(points, labels, to_camera[2].copy(), to_world[2].copy(), floor)
+    rows = to_camera[2].copy(), to_world[2].copy()
+    free = _free_depth(points, labels, *rows, floor, border_run)
     return Surroundings(free, np.isnan(points[..., 2]))
 
 
@@ -70,6 +73,7 @@ def _free_depth(
     to_depth: NDArray[np.float64],
     to_height: NDArray[np.float64],
     floor: float,
+    border_run: int,
 ) -> NDArray[np.float32]:
     height, width, _ = points.shape
     free = np.empty((height, width), dtype=np.float32)
@@ -81,11 +85,11 @@ def _free_depth(
                 continue
             label = labels[row, column]
             within = label >= 0 and label == left_label
-            _fill(free[row], last + 1, column, left, depth, within)
+            _fill(free[row], last + 1, column, left, depth, within, border_run)
             on_support = _along(to_height, points[row, column]) <= floor
             free[row, column] = EMPTY if on_support else depth
             last, left, left_label = column, depth, label
-        _fill(free[row], last + 1, width, left, UNKNOWN, False)
+        _fill(free[row], last + 1, width, left, UNKNOWN, False, border_run)
     return free
 
 
@@ -97,7 +101,13 @@ def _along(row: NDArray[np.float64], point: NDArray[np.float32]) -> float:
 
 @njit(cache=True)
 def _fill(
-    free: NDArray[np.float32], start: int, stop: int, left: float, right: float, within: bool
+    free: NDArray[np.float32],
+    start: int,
+    stop: int,
+    left: float,
+    right: float,
+    within: bool,
+    border_run: int,
 ) -> None:
     """Fill a gap between two depths, one of which is unknown at the image's border."""
     if within:
@@ -105,7 +115,7 @@ def _fill(
     elif left != UNKNOWN and right != UNKNOWN:
         free[start:stop] = max(left, right)
     else:
-        free[start:stop] = EMPTY if stop - start > BORDER_RUN else UNKNOWN
+        free[start:stop] = EMPTY if stop - start > border_run else UNKNOWN
 
 
 @njit(cache=True)

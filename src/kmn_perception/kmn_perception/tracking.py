@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MEMORY = 30  # frames for which an object that is not seen keeps its number
-
 
 @dataclass(eq=False)
 class _Track:
@@ -25,17 +23,19 @@ class ObjectTracker:
     ----------
     max_distance
         An object whose centre moved further than this between two frames is another one, metres.
+    memory
+        Frames for which an object that is not seen keeps its number.
     """
 
-    def __init__(self, max_distance: float) -> None:
-        self.max_distance = max_distance
+    def __init__(self, max_distance: float, memory: int) -> None:
+        self.max_distance, self.memory = max_distance, memory
         self._tracks: list[_Track] = []
         self._frame, self._next = 0, 1
 
     def update(self, centres: Sequence[NDArray[np.floating]]) -> list[int]:
         """Return the numbers, from 1 on, of a frame's objects with these centres (3,), metres."""
         self._frame += 1
-        oldest = self._frame - MEMORY
+        oldest = self._frame - self.memory
         self._tracks = [track for track in self._tracks if track.last_seen >= oldest]
         pairs = [
             (float(np.linalg.norm(centre - track.centre)), i, track)

@@ -7,11 +7,15 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import pytest
+import yaml
 from numpy.typing import NDArray
 
+from kmn_perception import resources
 from kmn_perception.camera import Camera
+from kmn_perception.estimator import MorphEstimator
+from kmn_perception.node_parameters import NodeSettings
+from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.rendering import depth_to_points
-from kmn_perception.resources import share_directory
 
 
 class RealFrame(NamedTuple):
@@ -25,10 +29,30 @@ class RealFrame(NamedTuple):
 def real_frame(request: pytest.FixtureRequest) -> RealFrame:
     images: list[Any] = [
         cv2.imread(
-            str(share_directory() / f"data/kinect_boxes/learn{request.param}_{kind}.png"),
+            str(resources.share_directory() / f"data/kinect_boxes/learn{request.param}_{kind}.png"),
             cv2.IMREAD_UNCHANGED,
         )
         for kind in "dl"
     ]
     depth = np.where(images[0] > 0, images[0] / 1000.0, np.nan).astype(np.float32)
     return RealFrame(depth_to_points(depth, Camera.load("kinect_v1")), images[1])
+
+
+def tabletop_pipeline() -> MorphPipeline:
+    """Return the pipeline of morph_node for boxes on a table; nothing of it is compiled yet."""
+    values = {}
+    for name in ("morph_node", "morph_node_tabletop"):
+        file = yaml.safe_load(resources.find("config/nodes", name).read_text())
+        values.update(file["/**"]["ros__parameters"])
+    settings = NodeSettings.check(values)
+    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
+    return MorphPipeline(estimator, settings.pipeline)
+
+
+def cuboid(
+    size: tuple[float, float, float], centre: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Return the map (4, 4) of the unit cube to an upright cuboid, metres."""
+    cube = np.diag([*size, 1.0])
+    cube[:3, 3] = centre
+    return cube

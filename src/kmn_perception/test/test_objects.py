@@ -8,34 +8,22 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-import yaml
 from numpy.typing import NDArray
 
-from kmn_perception import resources
 from kmn_perception.camera import Camera, look_at
-from kmn_perception.estimator import MorphEstimator, Status
-from kmn_perception.node_parameters import NodeSettings
-from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.estimator import Status
+from kmn_perception.pipeline import ObjectEstimate
 from kmn_perception.rendering import depth_to_points, render
 from kmn_perception.sensor import add_noise
 
-from .conftest import RealFrame
+from .conftest import RealFrame, tabletop_pipeline
 
 KINECT = Camera.load("kinect_v1")
 CAMERA = replace(KINECT, pose=look_at([0.0, -0.75, 0.65], [0.0, 0.0, 0.0]))
 TABLE = (0.0, 0.0, -0.01, 1.2, 1.2, 0.02, 0.0)
 Box = tuple[float, float, float, float, float, float, float]  # centre, size, yaw
 
-
-@cache
-def pipeline() -> MorphPipeline:
-    values = {}
-    for name in ("morph_node", "morph_node_tabletop"):
-        file = yaml.safe_load(resources.find("config/nodes", name).read_text())
-        values.update(file["/**"]["ros__parameters"])
-    settings = NodeSettings.check(values)
-    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
-    return MorphPipeline(estimator, settings.pipeline)
+pipeline = cache(tabletop_pipeline)
 
 
 def unit_cube(box: Box) -> NDArray[np.float64]:

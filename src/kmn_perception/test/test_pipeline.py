@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import ModuleType
 
 import numba
-import yaml
 
 from kmn_perception import (
     creases,
@@ -13,15 +12,12 @@ from kmn_perception import (
     observation,
     rendering,
     residual,
-    resources,
     segmentation,
     surroundings,
     union_find,
     windows,
 )
-from kmn_perception.estimator import MorphEstimator, Status
-from kmn_perception.node_parameters import NodeSettings
-from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.estimator import Status
 from kmn_perception.refinement import (
     capture,
     correlation,
@@ -34,7 +30,7 @@ from kmn_perception.refinement import (
     view,
 )
 
-from .conftest import RealFrame
+from .conftest import RealFrame, tabletop_pipeline
 
 COMPILED: tuple[ModuleType, ...] = (
     capture,
@@ -67,18 +63,8 @@ def compiled_signatures() -> dict[str, int]:
     }
 
 
-def tabletop() -> MorphPipeline:
-    values = {}
-    for name in ("morph_node", "morph_node_tabletop"):
-        file = yaml.safe_load(resources.find("config/nodes", name).read_text())
-        values.update(file["/**"]["ros__parameters"])
-    settings = NodeSettings.check(values)
-    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
-    return MorphPipeline(estimator, settings.pipeline)
-
-
 def test_a_real_carton_is_estimated_and_nothing_is_compiled_for_it(real_frame: RealFrame) -> None:
-    pipeline = tabletop()
+    pipeline = tabletop_pipeline()
     pipeline.warm_up()
     before = compiled_signatures()
     found = pipeline.estimate_all(real_frame.points)

@@ -20,6 +20,8 @@ from kmn_perception.segmentation import SegmentationSettings, remove_background
 from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 from kmn_perception.transformation import transform_points
 
+from .conftest import cuboid
+
 SETTINGS = SegmentationSettings(
     crop=True,
     crop_min=(-1.0, -1.0, -0.2),
@@ -34,16 +36,6 @@ SETTINGS = SegmentationSettings(
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)
 KINECT_V1 = np.array([[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]])
-
-
-def cuboid(
-    size: tuple[float, float, float], centre: tuple[float, float, float]
-) -> NDArray[np.float64]:
-    cube = np.diag([*size, 1.0])
-    cube[:3, 3] = centre
-    return cube
-
-
 TABLE = cuboid((1.6, 1.6, 0.02), (0.0, 0.0, -0.01))
 NEAR_BOX = cuboid((0.2, 0.1, 0.1), (-0.1, -0.2, 0.05))
 FAR_BOX = cuboid((0.3, 0.1, 0.3), (0.1, 0.1, 0.15))

@@ -20,18 +20,10 @@ from kmn_perception.support_plane import (
     pose_above,
 )
 
+from .conftest import cuboid
+
 SETTINGS = SupportPlaneSettings(distance=0.01, max_tilt=np.radians(75.0), min_fraction=0.2)
 CAMERA = Camera.load("kinect_v1").resized(160, 120)
-
-
-def cuboid(
-    size: tuple[float, float, float], centre: tuple[float, float, float]
-) -> NDArray[np.float64]:
-    cube = np.diag([*size, 1.0])
-    cube[:3, 3] = centre
-    return cube
-
-
 TABLE = cuboid((2.0, 2.0, 0.02), (0.0, 0.0, -0.01))
 BOX = cuboid((0.3, 0.2, 0.25), (0.05, -0.1, 0.125))
 FLOOR = cuboid((20.0, 20.0, 0.02), (0.0, 0.0, -0.71))

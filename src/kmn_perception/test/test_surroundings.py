@@ -13,10 +13,11 @@ from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.observation import Observation, Surroundings
 from kmn_perception.refinement import Refinement, RefinementSettings, refine
 from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.surroundings import BORDER_RUN, EMPTY, UNKNOWN, surroundings, touches_unseen
+from kmn_perception.surroundings import EMPTY, UNKNOWN, surroundings, touches_unseen
 
 NONE = np.nan
 HIGH, ON_SUPPORT = 1.0, 0.0  # metres above the support
+BORDER_RUN = 8  # pixels
 WIDE = BORDER_RUN + 1
 CHI_SQUARED = 12.6  # 95 % of six degrees of freedom
 
@@ -30,7 +31,7 @@ def row(*runs: tuple[float, float, int]) -> NDArray[np.float32]:
 def free(points: NDArray[np.float32]) -> NDArray[np.float32]:
     to_world = np.eye(4)[[1, 2, 0, 3]]  # the test's heights are in x
     nothing = np.full(points.shape[:2], -1, dtype=np.int32)
-    return surroundings(points, nothing, np.eye(4), to_world, 0.01).free_depth[0]
+    return surroundings(points, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth[0]
 
 
 def test_pixels_are_empty_up_to_what_they_show_and_wholly_where_they_show_the_support() -> None:
@@ -51,10 +52,10 @@ def test_a_gap_is_empty_up_to_the_farther_one_of_those_beside_it() -> None:
 def test_a_gap_within_an_object_is_unknown() -> None:
     points = row((0.7, HIGH, 2), (NONE, HIGH, 3), (0.8, HIGH, 2))
     labels = np.array([[0, 0, -1, -1, -1, 0, 0]], dtype=np.int32)
-    known = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf).free_depth[0]
+    known = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
     np.testing.assert_allclose(known, [0.7, 0.7, UNKNOWN, UNKNOWN, UNKNOWN, 0.8, 0.8])
     labels[0, -2:] = 1
-    other = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf).free_depth[0]
+    other = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
     np.testing.assert_allclose(other[2:5], 0.8)
 
 
@@ -67,7 +68,7 @@ def test_a_narrow_gap_at_the_border_is_unknown(length: int, known: float) -> Non
 
 def test_what_was_not_measured_is_presumed() -> None:
     points = row((0.7, HIGH, 1), (NONE, HIGH, 2))
-    around = surroundings(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0)
+    around = surroundings(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
     np.testing.assert_array_equal(around.presumed, [[False, True, True]])
 
 

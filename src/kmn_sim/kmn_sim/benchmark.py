@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import rclpy
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_perception.node_process import ProcessError
+from kmn_perception.ros_program import ros_session
 from kmn_sim.check_perception import whole_scenes
 from kmn_sim.depth_camera import DepthCamera
 from kmn_sim.live import live_scenes
@@ -118,17 +116,11 @@ def report(result: dict[str, Any]) -> str:
 def main() -> int:
     """Run the executable ``benchmark``."""
     options = arguments(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    with ros_session("benchmark"):
         result = benchmark(options.scenes)
-    except (OSError, ValueError, ProcessError) as error:
-        print(f"benchmark: {error}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.shutdown()
     print(report(result))
     if options.json:
-        options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, result)
     return 0
 
 

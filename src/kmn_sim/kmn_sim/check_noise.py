@@ -3,35 +3,63 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from kmn_perception import resources
 from kmn_perception.camera import Camera
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
+from kmn_perception.configuration import Section
 from kmn_perception.estimator import Status
 from kmn_perception.frames.experiment import load_pipeline
 from kmn_perception.frames.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.observation import Observation
 from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError
 from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.resources import share_directory
 from kmn_sim.kinect import Kinect, KinectSettings
 from kmn_sim.noise_statistics import inverse_step, missing_runs, plane_noise
 
-CAMERA = "kinect_v1"
-TABLE_SIZE = (6.0, 6.0, 0.01)  # metres
-DISTANCES = (0.6, 0.8, 1.0, 1.2)  # metres
-REACH = 0.05  # metres about each distance
-LEVELS = (0.95, 1.05)  # metres between which the steps of the depth are counted
+
+class CheckSettings(NamedTuple):
+    """How the two are compared.
+
+    Attributes
+    ----------
+    camera
+        Of the real frames.
+    table
+        Size of the simulated table, metres.
+    distances, reach
+        Where the noise about the table is told, and how far about each distance, metres.
+    levels
+        Depths between which their steps are counted, metres.
+    """
+
+    camera: Camera
+    table: list[float]
+    distances: list[float]
+    reach: float
+    levels: tuple[float, float]
+
+    @classmethod
+    def load(cls) -> CheckSettings:
+        """Read ``config/simulation/check_noise.yaml``."""
+        section = Section.load(resources.find("config/simulation", "check_noise"))
+        section.allow(cls._fields)
+        return cls(
+            camera=Camera.load(section.text("camera")),
+            table=section.numbers("table", 3),
+            distances=section.numbers("distances"),
+            reach=section.number("reach", 0.0),
+            levels=section.limits("levels"),
+        )
 
 
 class Frame(NamedTuple):
@@ -49,19 +77,21 @@ class Twins(NamedTuple):
     simulated: Frame
 
 
-def twins(frames: Sequence[LabelledFrame], seed: int) -> Iterator[Twins]:
+def twins(frames: Sequence[LabelledFrame], settings: CheckSettings, seed: int) -> Iterator[Twins]:
     """Yield real frames with their simulated twins; frames without an estimate are left out."""
-    pipeline, settings = load_pipeline(), KinectSettings.load()
+    pipeline, sensor = load_pipeline(), KinectSettings.load()
     for number, frame in enumerate(frames):
         real = Frame(frame.depth, frame.labels == TABLE, frame.labels == frame.objects[0])
-        scene = scene_of(real, pipeline)
+        scene = scene_of(real, settings.camera, pipeline)
         if scene is not None:
-            yield Twins(real, simulate(*scene, Kinect(settings, seed + number)))
+            yield Twins(real, simulate(*scene, settings.table, Kinect(sensor, seed + number)))
 
 
-def scene_of(frame: Frame, pipeline: MorphPipeline) -> tuple[Camera, NDArray[np.float64]] | None:
-    """Return the camera and the box's cuboids (B, 4, 4) of a real frame, None if not found."""
-    camera, estimator = Camera.load(CAMERA), pipeline.estimator
+def scene_of(
+    frame: Frame, camera: Camera, pipeline: MorphPipeline
+) -> tuple[Camera, NDArray[np.float64]] | None:
+    """Return the camera, with its pose, and the box's cuboids (B, 4, 4), None if not found."""
+    estimator = pipeline.estimator
     points = depth_to_points(frame.depth, camera)
     try:
         pose = pipeline.camera_pose(points)
@@ -76,25 +106,27 @@ def scene_of(frame: Frame, pipeline: MorphPipeline) -> tuple[Camera, NDArray[np.
     return camera, estimator.model.unit_cubes(estimate.theta, estimate.gamma)
 
 
-def simulate(camera: Camera, box: NDArray[np.float64], kinect: Kinect) -> Frame:
+def simulate(
+    camera: Camera, box: NDArray[np.float64], table_size: Sequence[float], kinect: Kinect
+) -> Frame:
     """Return what the simulated sensor measures of a box on a table, in whole millimetres."""
-    table = np.diag([*TABLE_SIZE, 1.0])
-    table[2, 3] = -TABLE_SIZE[2] / 2.0
+    table = np.diag([*table_size, 1.0])
+    table[2, 3] = -table_size[2] / 2.0
     exact = render(np.concatenate([table[None], box]), camera)
     is_box = render(box, camera) == exact
     depth = np.round(1e3 * kinect.measure(exact, camera.fx)) / 1e3
     return Frame(depth.astype(np.float32), np.isfinite(exact) & ~is_box, is_box)
 
 
-def noise(images: Sequence[Frame]) -> dict[str, float]:
+def noise(images: Sequence[Frame], settings: CheckSettings) -> dict[str, float]:
     """Return the noise about the table by distance, and the steps of the depth."""
     patches = [plane_noise(image.depth, image.table) for image in images]
     means, deviations = (np.concatenate(parts) for parts in zip(*patches, strict=True))
     result = {}
-    for distance in DISTANCES:
-        near = np.abs(means - distance) < REACH
+    for distance in settings.distances:
+        near = np.abs(means - distance) < settings.reach
         result[f"noise at {distance:g} m [mm]"] = 1e3 * float(np.median(deviations[near]))
-    steps = [inverse_step(image.depth, *LEVELS) for image in images]
+    steps = [inverse_step(image.depth, *settings.levels) for image in images]
     result["step of 1 / depth [1/km]"] = 1e3 * float(np.median(steps))
     return result
 
@@ -116,10 +148,11 @@ def missing(pairs: Sequence[Twins]) -> list[dict[str, float]]:
 
 def compare(count: int, seed: int) -> dict[str, dict[str, float]]:
     """Return the statistics ``real`` and ``simulated`` of at most so many frames."""
-    frames = read_frames(share_directory() / "data" / "kinect_boxes")[:count]
-    pairs = list(tqdm(twins(frames, seed), total=len(frames), unit="frame"))
+    frames = read_frames(resources.share_directory() / "data" / "kinect_boxes")[:count]
+    settings = CheckSettings.load()
+    pairs = list(tqdm(twins(frames, settings, seed), total=len(frames), unit="frame"))
     return {
-        name: {**noise(images), **beside}
+        name: {**noise(images, settings), **beside}
         for name, images, beside in zip(
             Twins._fields, zip(*pairs, strict=True), missing(pairs), strict=True
         )
@@ -144,7 +177,7 @@ def main() -> int:
         rows.append([name, *(f"{values[name]:.2f}" for values in result.values())])
     print(columns(rows))
     if options.json:
-        Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, result)
     return 0
 
 

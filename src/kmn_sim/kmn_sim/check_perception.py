@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import rclpy
 from numpy.typing import NDArray
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from kmn_perception.camera import Camera
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_process import ProcessError
+from kmn_perception.ros_program import ros_session
 from kmn_sim.kinect import NOISES
 from kmn_sim.live import Answer, live_scenes
 
@@ -115,17 +112,11 @@ def summary(result: dict[str, Any]) -> str:
 def main() -> int:
     """Run the executable ``check_perception``."""
     options = arguments(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    with ros_session("check_perception"):
         result = check(options)
-    except (OSError, ValueError, ProcessError) as error:
-        print(f"check_perception: {error}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.shutdown()
     print(summary(result))
     if options.json:
-        options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, result)
     return 0 if result["within"] == len(result["scenes"]) else 1
 
 

@@ -7,8 +7,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
+
+from kmn_perception.node_reports import make_status
 
 
 class SimulationStatistics:
@@ -83,15 +85,6 @@ class SimulationStatistics:
             }
             refused = self._last.startswith("refused")
         return [
-            _status(f"{name}: simulation", self._failures > 0, "running", world),
-            _status(f"{name}: trajectory", refused, self._last, control),
+            make_status(f"{name}: simulation", self._failures > 0, "running", world),
+            make_status(f"{name}: trajectory", refused, self._last, control),
         ]
-
-
-def _status(name: str, warn: bool, message: str, values: dict[str, str]) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=DiagnosticStatus.WARN if warn else DiagnosticStatus.OK,
-        name=name,
-        message=message,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )

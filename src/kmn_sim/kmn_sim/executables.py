@@ -1,35 +1,14 @@
-"""The executables of the package; each loads its module when it starts."""
+"""The executables of the package."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-from importlib import import_module
+from kmn_perception.executable import executable as _executable
 
-INTERRUPTED = 130  # exit status of a program that Ctrl-C ended, by convention 128 + SIGINT
 SIMULATOR = "pybullet"
-HINT = "install it with: make setup-simulation"
 
-
-def _executable(module: str) -> Callable[[], int | None]:
-    def start() -> int | None:
-        try:
-            status: int | None = import_module(f"kmn_sim.{module}").main()
-        except ModuleNotFoundError as error:
-            if error.name != SIMULATOR:
-                raise
-            print(f"{error.name} is missing; {HINT}", file=sys.stderr)
-            return 1
-        except KeyboardInterrupt:
-            return INTERRUPTED
-        return status
-
-    return start
-
-
-sim_node = _executable("start_sim_node")
-snapshot = _executable("snapshot")
-check_perception = _executable("check_perception")
-check_noise = _executable("check_noise")
-benchmark = _executable("benchmark")
-robot_description = _executable("robot_description")
+sim_node = _executable("kmn_sim.start_sim_node", SIMULATOR)
+snapshot = _executable("kmn_sim.snapshot", SIMULATOR)
+check_perception = _executable("kmn_sim.check_perception", SIMULATOR)
+check_noise = _executable("kmn_sim.check_noise", SIMULATOR)
+benchmark = _executable("kmn_sim.benchmark", SIMULATOR)
+robot_description = _executable("kmn_sim.robot_description", SIMULATOR)

@@ -5,29 +5,25 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import rclpy
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_process import NodeProcess, ProcessError
+from kmn_perception.node_process import NodeProcess, ProcessClient, parameter_arguments
 from kmn_sim.messages import seconds
 
 START_TIMEOUT = 180.0  # seconds for both nodes to load and compile
 ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene
-POLL_PERIOD = 0.05  # seconds
 CAMERA_RATE = 4.0  # frames a second; morph_node shall not fall behind
-Found = TypeVar("Found")
 
 
 class Answer(NamedTuple):
@@ -60,10 +56,7 @@ class LiveScenes:
     """
 
     def __init__(self, node: Node, processes: list[NodeProcess]) -> None:
-        self._processes = processes
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
-        self._node = node
+        self._client = ProcessClient(node, processes)
         self._estimates: list[tuple[MorphingParameters, float]] = []
         self._truths: list[MorphingParameters] = []
         node.create_subscription(MorphingParameters, "morphing_parameters", self._keep, 10)
@@ -71,8 +64,8 @@ class LiveScenes:
         self._setting = node.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )
-        self._wait(lambda: self._setting.service_is_ready(), START_TIMEOUT, "sim_node")
-        self._wait(
+        self._client.wait(self._setting.service_is_ready, START_TIMEOUT, "sim_node")
+        self._client.wait(
             lambda: node.count_publishers(f"{node.get_namespace()}/morphed_model"),
             START_TIMEOUT,
             "morph_node",
@@ -86,10 +79,11 @@ class LiveScenes:
         ProcessError
             If a node has ended, or there is no answer.
         """
-        self._set(placement="given", values=[float(value) for value in values])
+        scene = {"placement": "given", "values": [float(value) for value in values]}
+        self._client.set_parameters(self._setting, scene, ANSWER_TIMEOUT)
         self._truths.clear()
         self._estimates.clear()
-        estimate, received = self._wait(self._answered, ANSWER_TIMEOUT, "morph_node")
+        estimate, received = self._client.wait(self._answered, ANSWER_TIMEOUT, "morph_node")
         truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
         return Answer(
             np.array([*truth.theta, *truth.gamma]),
@@ -106,26 +100,6 @@ class LiveScenes:
         """Return an estimate of an exposure of the present scene."""
         stamps = [truth.header.stamp for truth in self._truths]
         return next((pair for pair in self._estimates if pair[0].header.stamp in stamps), None)
-
-    def _set(self, **values: Any) -> None:
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
-        )
-        future = self._setting.call_async(request)
-        self._wait(future.done, ANSWER_TIMEOUT, "sim_node")
-        result = future.result().result
-        if not result.successful:
-            raise ProcessError(f"sim_node refused the scene: {result.reason}")
-
-    def _wait(self, find: Callable[[], Found | None], timeout: float, whom: str) -> Found:
-        deadline = time.monotonic() + timeout
-        while not (found := find()):
-            for process in self._processes:
-                process.check()
-            if time.monotonic() > deadline:
-                raise ProcessError(f"{whom} did not answer within {timeout:g} s")
-            self._executor.spin_once(timeout_sec=POLL_PERIOD)
-        return found
 
 
 @contextmanager
@@ -151,7 +125,9 @@ def live_scenes(model: KinematicModel, name: str, noise: str, seed: int) -> Iter
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         processes = [
             stack.enter_context(
-                NodeProcess(module, [*_arguments(parameters), "-r", alone], folder / module)
+                NodeProcess(
+                    module, [*parameter_arguments(parameters), "-r", alone], folder / module
+                )
             )
             for module, parameters in (
                 ("kmn_sim.start_sim_node", sim),
@@ -161,7 +137,3 @@ def live_scenes(model: KinematicModel, name: str, noise: str, seed: int) -> Iter
         node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])
         stack.callback(node.destroy_node)
         yield LiveScenes(node, processes)
-
-
-def _arguments(parameters: dict[str, Any]) -> list[str]:
-    return [text for name, value in parameters.items() for text in ("-p", f"{name}:={value}")]

@@ -11,14 +11,10 @@ from PIL import Image
 
 from kmn_perception.camera import Camera, look_at
 from kmn_sim.scenario import Scenario
-from kmn_sim.settings import DoorSettings
+from kmn_sim.settings import DoorSettings, FilmSettings
 from kmn_sim.simulation import Simulation
 
 FORMATS = (".gif", ".mp4")
-FOCAL = 0.8  # focal length in widths of the picture
-DOOR_VIEW = 4.0, -1.5, 2.2  # to the left of and along the way from robot to door, and up
-DOOR_TARGET = 0.53, 0.9  # part of that way, and height
-BOX_VIEW = (1.6, -2.3, 1.3), (-0.1, -0.6, 0.0)  # the same in the world; metres
 
 
 class Recorder:
@@ -65,26 +61,21 @@ class Recorder:
 
 def snapshot(simulation: Simulation, width: int, height: int) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of robot and object, from beside them."""
-    camera = Camera(
-        width,
-        height,
-        FOCAL * width,
-        FOCAL * width,
-        (width - 1) / 2.0,
-        (height - 1) / 2.0,
-        _view(simulation.scenario),
-    )
+    settings = FilmSettings.load()
+    focal_length, pose = settings.focal_length * width, _view(simulation.scenario, settings)
+    centre = (width - 1) / 2.0, (height - 1) / 2.0
+    camera = Camera(width, height, focal_length, focal_length, *centre, pose)
     return simulation.renderer.render(camera).colour
 
 
-def _view(scenario: Scenario) -> NDArray[np.float64]:
+def _view(scenario: Scenario, settings: FilmSettings) -> NDArray[np.float64]:
     """Return the pose (4, 4) of the camera that shows what is done."""
     if not scenario.is_door:
-        return look_at(*BOX_VIEW)
+        return look_at(settings.box_position, settings.box_target)
     start = np.array(DoorSettings.load().robot[:2])
     way = scenario.model.transformation.matrix(scenario.theta)[:2, 3] - start
     along = way / np.linalg.norm(way)
     left = np.array([-along[1], along[0]])
-    target = start + DOOR_TARGET[0] * way
-    position = target + DOOR_VIEW[0] * left + DOOR_VIEW[1] * along
-    return look_at((*position, DOOR_VIEW[2]), (*target, DOOR_TARGET[1]))
+    target = start + settings.target * way
+    position = target + settings.left * left + settings.along * along
+    return look_at((*position, settings.height), (*target, settings.target_height))

@@ -131,5 +131,50 @@ class BoxSettings(NamedTuple):
         )
 
 
+class FilmSettings(NamedTuple):
+    """Where the camera stands that takes pictures of a run; metres.
+
+    Attributes
+    ----------
+    focal_length
+        In widths of the picture.
+    left, along, height
+        Of its place before a door: to the left of what it looks at, from there along the way from
+        the robot's start to the door, and up.
+    target, target_height
+        What it looks at there: the part of that way, and the height.
+    box_position, box_target
+        Its place before a box and what it looks at there, in the world.
+    """
+
+    focal_length: float
+    left: float
+    along: float
+    height: float
+    target: float
+    target_height: float
+    box_position: list[float]
+    box_target: list[float]
+
+    @classmethod
+    def load(cls) -> FilmSettings:
+        """Read ``config/simulation/film.yaml``."""
+        section = _load("film")
+        section.allow(("focal_length", "door", "box"))
+        door, box = section.section("door"), section.section("box")
+        door.allow(("left", "along", "height", "target", "target_height"))
+        box.allow(("position", "target"))
+        return cls(
+            focal_length=section.number("focal_length", 0.01),
+            left=door.number("left"),
+            along=door.number("along"),
+            height=door.number("height"),
+            target=door.number("target"),
+            target_height=door.number("target_height"),
+            box_position=box.numbers("position", 3),
+            box_target=box.numbers("target", 3),
+        )
+
+
 def _load(name: str) -> Section:
     return Section.load(resources.find("config/simulation", name))

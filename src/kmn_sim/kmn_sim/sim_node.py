@@ -8,10 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -23,27 +21,20 @@ from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.messages import cloud_from_points, image_from_depth, info_from_camera
+from kmn_perception.node_reports import ThrottledWarnings, report_periodically
 from kmn_perception.rendering import depth_to_points
+from kmn_perception.ros_parameters import declare_parameters, read_parameters
 from kmn_sim import messages
 from kmn_sim.depth_camera import DepthCamera
 from kmn_sim.diagnostics import SimulationStatistics
-from kmn_sim.node_parameters import (
-    FILM,
-    SENSOR,
-    WORLD,
-    NodeSettings,
-    declare_parameters,
-    read_parameters,
-)
+from kmn_sim.node_parameters import DESCRIPTORS, FILM, SENSOR, WORLD, NodeSettings
 from kmn_sim.pr2_settings import PR2Settings
 from kmn_sim.recorder import Recorder
 from kmn_sim.runner import Runner
 from kmn_sim.simulation import Simulation
 from kmn_sim.trajectory import TrajectoryError
 
-DIAGNOSTICS_PERIOD = 1.0  # seconds
 CLOCK_PERIOD = 0.01  # simulated seconds between two messages on /clock
-WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
 QUEUE_DEPTH = 10
 
 
@@ -60,11 +51,12 @@ class SimNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
-        declare_parameters(self)
-        self._settings = settings = NodeSettings.check(read_parameters(self))
+        self._settings = settings = NodeSettings.check(
+            declare_parameters(self, "sim_node", DESCRIPTORS)
+        )
         self._depth_camera = self._make_camera(settings)
         self._statistics = SimulationStatistics(PR2Settings.load().names)
-        self._warned: dict[str, float] = {}
+        self._warnings = ThrottledWarnings(self)
         self._connect()
         self._runner = Runner(self._make_simulation, self._on_failure)
         self._runner.real_time_factor = settings["real_time_factor"]
@@ -88,9 +80,7 @@ class SimNode(Node):
         )
         self.create_service(Trigger, "reset", self._on_reset)
         self.add_on_set_parameters_callback(self._on_parameters)
-        # A steady clock: reports go on when a simulated time stops or jumps.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
+        report_periodically(self, self._report)
         self.get_logger().info(f"simulating model '{settings['model']}', depth by '{renderer}'")
 
     def destroy_node(self) -> None:
@@ -109,9 +99,6 @@ class SimNode(Node):
         self._image_publisher = self.create_publisher(Image, "depth/image", QUEUE_DEPTH)
         self._info_publisher = self.create_publisher(CameraInfo, "depth/camera_info", QUEUE_DEPTH)
         self._points_publisher = self.create_publisher(PointCloud2, "points", QUEUE_DEPTH)
-        self._diagnostics_publisher = self.create_publisher(
-            DiagnosticArray, "/diagnostics", QUEUE_DEPTH
-        )
 
     def _make_simulation(self) -> Simulation:
         settings = self._settings
@@ -199,7 +186,7 @@ class SimNode(Node):
             self._runner.call(lambda simulation: self._accept(simulation, message))
         except TrajectoryError as error:
             self._statistics.refuse(error.reason, str(error))
-            self._warn(error.reason, f"trajectory refused, {error.reason}: {error}")
+            self._warnings.warn(error.reason, f"trajectory refused, {error.reason}: {error}")
         else:
             self._statistics.accept()
 
@@ -225,11 +212,8 @@ class SimNode(Node):
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
-        values = read_parameters(self)
-        values.update((p.name, p.value) for p in parameters if p.name in values)
-        values["values"] = list(values["values"])
         try:
-            settings = NodeSettings.check(values)
+            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
@@ -246,20 +230,9 @@ class SimNode(Node):
 
     def _on_failure(self, error: Exception) -> None:
         self._statistics.fail()
-        self._warn("internal_error", "".join(traceback.format_exception(error)))
+        self._warnings.warn("internal_error", "".join(traceback.format_exception(error)))
 
-    def _warn(self, key: str, text: str) -> None:
-        """Log a warning, but not more often than once in a period for each key."""
-        now = time.monotonic()
-        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
-            self._warned[key] = now
-            self.get_logger().warning(text)
-
-    def _report(self) -> None:
+    def _report(self) -> list[DiagnosticStatus]:
         name = self.get_fully_qualified_name()
         simulated = self._runner.call(lambda simulation: simulation.time)
-        report = DiagnosticArray(
-            status=self._statistics.report(name, self._runner.achieved, simulated, self._renderer)
-        )
-        report.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics_publisher.publish(report)
+        return self._statistics.report(name, self._runner.achieved, simulated, self._renderer)

@@ -7,16 +7,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from numpy.typing import NDArray
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from kmn_msgs.action import OpenDoor
 from kmn_perception.columns import columns
 from kmn_perception.command_line import whole_number
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_process import ProcessError
+from kmn_perception.ros_program import ros_session
 from kmn_skill.door_system import DoorSystem, Opened
 from kmn_skill.evaluate import NOISES, random_doors
 from kmn_skill.experiment import MODES, Experiment
@@ -101,14 +99,8 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 def main() -> int:
     """Run the executable ``demo``."""
     options = arguments(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    with ros_session("demo"):
         is_open = run(options, Experiment.load())
-    except (OSError, ValueError, ProcessError) as error:
-        print(f"demo: {error}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.shutdown()
     print("the door is open" if is_open else "the door is NOT open")
     return 0 if is_open else 1
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 from collections import Counter
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
+from kmn_perception.node_reports import make_status
 from kmn_skill.opening import SUCCESS, Result
 
 
@@ -84,15 +85,6 @@ class SkillStatistics:
             failed = self._last not in (SUCCESS, "no goal yet")
             phase = self._phase
         return [
-            _status(f"{name}: goals", failed, phase, goals),
-            _status(f"{name}: door", bool(door), door or "known", messages),
+            make_status(f"{name}: goals", failed, phase, goals),
+            make_status(f"{name}: door", bool(door), door or "known", messages),
         ]
-
-
-def _status(name: str, warn: bool, message: str, values: dict[str, str]) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=DiagnosticStatus.WARN if warn else DiagnosticStatus.OK,
-        name=name,
-        message=message,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )

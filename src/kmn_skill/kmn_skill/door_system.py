@@ -4,41 +4,62 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from copy import copy
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.action.client import ActionClient
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.node_process import NodeProcess, ProcessError
+from kmn_perception import resources
+from kmn_perception.configuration import Section
+from kmn_perception.node_process import NodeProcess, ProcessClient, parameter_arguments
 from kmn_skill.experiment import Timeouts
 from kmn_skill.opening import Goal
 
-POLL_PERIOD = 0.02  # seconds
 QUEUE_DEPTH = 10
-STATE_TIMEOUT, MAX_AGE = 1.0, 3.0  # seconds by the wall's clock, of states and parameters
-FRAMES = 5  # of a new door, after which skill_node relies on no older one
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
 SOURCES = {  # of the door's parameters, and the topic that skill_node takes them from
     "perceived": "morphing_parameters",
     "true": "ground_truth",
     "prototype": "prototype_parameters",
 }
-Found = TypeVar("Found")
+
+
+class Patience(NamedTuple):
+    """How long what is late is waited for.
+
+    Attributes
+    ----------
+    frames
+        Of a new door, after which skill_node relies on no older one.
+    skill_node
+        Parameters of skill_node, in seconds of the wall's clock.
+    """
+
+    frames: int
+    skill_node: dict[str, float]
+
+    @classmethod
+    def load(cls) -> Patience:
+        """Read ``config/skill/system.yaml``."""
+        section = Section.load(resources.find("config/skill", "system"))
+        section.allow(cls._fields)
+        parameters = section.section("skill_node")
+        return cls(
+            frames=section.whole_number("frames", 1, 1000),
+            skill_node={name: parameters.number(name, 0.0) for name in parameters.values},
+        )
 
 
 class Opened(NamedTuple):
@@ -79,6 +100,7 @@ class DoorSystem:
 
     def __init__(self, sim: dict[str, Any], source: str, timeouts: Timeouts) -> None:
         self._sim, self._source, self._timeouts = sim, source, timeouts
+        self._patience = Patience.load()
         self._processes: list[NodeProcess] = []
         self._stack = ExitStack()
         self._truth: MorphingParameters | None = None
@@ -91,17 +113,15 @@ class DoorSystem:
             namespace = f"/doors_{os.getpid()}"  # whatever else runs here is not disturbed
             remaps = [f"__ns:={namespace}", f"/clock:={namespace}/clock"]
             for module, parameters, more in self._nodes():
-                arguments = [part for text in (*remaps, *more) for part in ("-r", text)]
-                for name, value in parameters.items():
-                    arguments += ["-p", f"{name}:={value}"]
+                renamed = [part for text in (*remaps, *more) for part in ("-r", text)]
+                arguments = [*renamed, *parameter_arguments(parameters)]
                 process = NodeProcess(module, arguments, folder / module)
                 self._processes.append(stack.enter_context(process))
             self._node = Node("doors", cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
             stack.callback(self._node.destroy_node)
-            self._executor = SingleThreadedExecutor()
-            self._executor.add_node(self._node)
+            self._client = ProcessClient(self._node, self._processes)
             self._connect()
-            self._wait(self._is_ready, self._timeouts.start, "the system")
+            self._client.wait(self._is_ready, self._timeouts.start, "the system")
             self._stack = stack.pop_all()
         return self
 
@@ -116,10 +136,13 @@ class DoorSystem:
         scene = self._timeouts.scene
         self._set(placement="given", values=[float(v) for v in values], direction=direction)
         self._truth = None
-        truth = self._wait(lambda: self._truth_of(values), scene, "sim_node")
+        truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
         self._taken.clear()
-        self._wait(lambda: self._count_since(since) >= FRAMES, scene, "what perceives the door")
+        frames = self._patience.frames
+        self._client.wait(
+            lambda: self._count_since(since) >= frames, scene, "what perceives the door"
+        )
 
     def open(self, goal: Goal, feedback: Callable[[OpenDoor.Feedback], None]) -> Opened:
         """Open the door that is there; ``feedback`` is told what is being done."""
@@ -128,9 +151,9 @@ class DoorSystem:
         accepted = self._action.send_goal_async(
             request, feedback_callback=lambda message: feedback(message.feedback)
         )
-        self._wait(accepted.done, self._timeouts.scene, "skill_node")
+        self._client.wait(accepted.done, self._timeouts.scene, "skill_node")
         answer = accepted.result().get_result_async()
-        self._wait(answer.done, self._timeouts.goal, "skill_node")
+        self._client.wait(answer.done, self._timeouts.goal, "skill_node")
         return Opened(answer.result().result, perceived, self._hinge)
 
     def film(self, file: Path | None, rate: float) -> None:
@@ -142,17 +165,17 @@ class DoorSystem:
         simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, dict[str, Any], list[str]]] = [
             ("kmn_sim.start_sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill.start_skill_node", {**simulated, **self._patience()}, [door]),
+            ("kmn_skill.start_skill_node", {**simulated, **self._skill_parameters()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
             nodes.append(("kmn_perception.start_morph_node", morph, []))
         return nodes
 
-    def _patience(self) -> dict[str, float]:
-        """Return timeouts that are as long by the wall's clock as the defaults at real time."""
+    def _skill_parameters(self) -> dict[str, float]:
+        """Return the parameters of skill_node in simulated seconds."""
         pace = max(1.0, self._sim["real_time_factor"])
-        return {"state_timeout": STATE_TIMEOUT * pace, "max_age": MAX_AGE * pace}
+        return {name: pace * value for name, value in self._patience.skill_node.items()}
 
     def _connect(self) -> None:
         node = self._node
@@ -207,21 +230,4 @@ class DoorSystem:
             self._prototype.publish(prototype)
 
     def _set(self, **values: Any) -> None:
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
-        )
-        future = self._setting.call_async(request)
-        self._wait(future.done, self._timeouts.scene, "sim_node")
-        result = future.result().result
-        if not result.successful:
-            raise ProcessError(f"sim_node refused the door: {result.reason}")
-
-    def _wait(self, find: Callable[[], Found | None], timeout: float, whom: str) -> Found:
-        deadline = time.monotonic() + timeout
-        while not (found := find()):
-            for process in self._processes:
-                process.check()
-            if time.monotonic() > deadline:
-                raise ProcessError(f"{whom} did not answer within {timeout:g} s")
-            self._executor.spin_once(timeout_sec=POLL_PERIOD)
-        return found
+        self._client.set_parameters(self._setting, values, self._timeouts.scene)

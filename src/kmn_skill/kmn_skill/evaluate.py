@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import tempfile
@@ -12,16 +11,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import rclpy
 from numpy.typing import NDArray
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_process import ProcessError
+from kmn_perception.ros_program import ros_session
 from kmn_skill.door_system import SOURCES, DoorSystem
 from kmn_skill.experiment import MODES, Experiment
 from kmn_skill.strip import save_strip
@@ -189,18 +186,12 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 def main() -> int:
     """Run the executable ``evaluate``."""
     options = arguments(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    with ros_session("evaluate"):
         result = tally(run(options, Experiment.load()))
-    except (OSError, ValueError, ProcessError) as error:
-        print(f"evaluate: {error}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.shutdown()
     print(table(result))
     if options.json:
         named = {name: getattr(options, name) for name in ("mode", "parameters", "noise", "seed")}
-        options.json.write_text(json.dumps({**named, **result}, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, {**named, **result})
     return 0
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from builtin_interfaces.msg import Duration as DurationMessage
 from builtin_interfaces.msg import Time as TimeMessage
-from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Point
 from numpy.typing import NDArray
 from rclpy.duration import Duration
 from rclpy.time import Time
@@ -20,8 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import MessageError
-from kmn_perception.rotation import quaternion_from_matrix
+from kmn_perception.messages import MessageError, cube_marker
 from kmn_skill.door_motion import moved_cubes
 from kmn_skill.execution import Part
 from kmn_skill.opening import SUCCESS, Result
@@ -129,7 +128,7 @@ def markers_from_plan(
         _line(header, "handle", levers, HANDLE_COLOUR),
     ]
     for number, cube in enumerate(cubes[-1]):
-        markers.append(_cuboid(header, number, cube))
+        markers.append(cube_marker("door", number, cube, DOOR_COLOUR, header))
     return MarkerArray(markers=markers)
 
 
@@ -140,18 +139,6 @@ def _line(header: Header, name: str, points: NDArray[np.float64], colour: ColorR
     marker.scale.x = PATH_WIDTH
     marker.color = colour
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in points.tolist()]
-    return marker
-
-
-def _cuboid(header: Header, number: int, cube: NDArray[np.float64]) -> Marker:
-    """Draw a cuboid, given as map (4, 4) of the unit cube."""
-    marker = Marker(header=header, ns="door", id=number, type=Marker.CUBE, action=Marker.ADD)
-    size = np.linalg.norm(cube[:3, :3], axis=0)
-    x, y, z, w = quaternion_from_matrix(cube[:3, :3] / size).tolist()
-    marker.pose.position = Point(**dict(zip("xyz", cube[:3, 3].tolist(), strict=True)))
-    marker.pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
-    marker.scale = Vector3(**dict(zip("xyz", size.tolist(), strict=True)))
-    marker.color = DOOR_COLOUR
     return marker
 
 

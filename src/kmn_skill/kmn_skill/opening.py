@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.kinematic_model import Joint, KinematicModel
+from kmn_skill.door_memory import DoorMemory
 from kmn_skill.errors import (
     CancelledError,
     DoorError,
@@ -29,6 +30,8 @@ from kmn_skill.states import StateWatch, WorldState
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
 WAIT, PLAN = "wait", "plan"  # phases before those of the plan
 SUCCESS = "success"  # outcome of a goal that was reached
+# What a camera tells of a door that the robot hides.
+HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
 
 
 class Goal(NamedTuple):
@@ -106,12 +109,15 @@ class OpeningSettings:
         Further attempts after the robot or the door did not follow.
     handle_tolerance, door_tolerance
         By which the angles (rad) may miss the goal.
+    hidden_distance
+        Metres after which the robot may hide the door; then where it was before is relied upon.
     """
 
     door_timeout: float
     retries: int
     handle_tolerance: float
     door_tolerance: float
+    hidden_distance: float
 
 
 class DoorOpening:
@@ -121,8 +127,8 @@ class DoorOpening:
     ----------
     model
         Kinematic model of the door.
-    door, watch
-        What is known of the door and of the states.
+    door, memory, watch
+        What is known of the door, of the door before, and of the states.
     planner, commands
         What plans and what moves.
     cancelled
@@ -135,6 +141,7 @@ class DoorOpening:
         self,
         model: KinematicModel,
         door: PerceivedDoor,
+        memory: DoorMemory,
         watch: StateWatch,
         planner: Planner,
         commands: Commands,
@@ -143,7 +150,7 @@ class DoorOpening:
         cancelled: Callable[[], bool],
         feedback: Callable[[Feedback], None],
     ) -> None:
-        self._model, self._door, self._watch = model, door, watch
+        self._model, self._door, self._memory, self._watch = model, door, memory, watch
         self._planner, self._commands = planner, commands
         self._settings, self._execution = settings, execution
         self._cancelled, self._feedback = cancelled, feedback
@@ -212,11 +219,24 @@ class DoorOpening:
                 state = self._state()
                 self._report(WAIT, 0.0, state)
                 seen = self._door.values(self._commands.now())
-                return when_closed(self._model, seen, state.hinge)
-            except (StatesError, DoorError):
+                values = when_closed(self._model, seen, state.hinge)
+                self._memory.keep(values, state.robot)
+                return values
+            except StatesError:
                 if time.monotonic() > deadline:
                     raise
+            except DoorError as error:
+                if time.monotonic() > deadline:
+                    return self._recalled(state, error)
             time.sleep(POLL_PERIOD)
+
+    def _recalled(self, state: WorldState, error: DoorError) -> NDArray[np.float64]:
+        """Return where the door (n + m,) was, if it is the robot that hides it; else raise."""
+        values = self._memory.recall(state.robot, self._settings.hidden_distance)
+        if values is None or error.reason not in HIDDEN:
+            raise error
+        self._commands.tell(f"{error}; relying on where the door was before the robot drove up")
+        return values
 
     def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:
         state = self._state()

@@ -154,6 +154,7 @@ class PerceivedDoor:
         self._lock = threading.Lock()
         self._kept: deque[Observation] = deque(maxlen=MOST_FRAMES)
         self._refused: DoorError | None = None  # the last one
+        self._since = -math.inf  # seconds; what was seen before was another world
 
     def add(self, observation: Observation) -> None:
         """Keep an observation; one that is not usable parts those before from those after.
@@ -170,17 +171,20 @@ class PerceivedDoor:
                 self._kept.clear()
                 self._refused = refused
                 raise
+            if observation.time < self._since:
+                return  # came late, of another world
             if self._kept and observation.time == self._kept[-1].time:
                 return  # the same exposure once more
             if self._kept and observation.time < self._kept[-1].time:
                 self._kept.clear()  # the clock was set back: another world
             self._kept.append(observation)
 
-    def forget(self) -> None:
-        """Forget all observations, as of another world."""
+    def forget(self, now: float) -> None:
+        """Forget all observations from before a time (s), as of another world."""
         with self._lock:
             self._kept.clear()
             self._refused = None
+            self._since = now
 
     def values(self, now: float) -> NDArray[np.float64]:
         """Return the mean parameters (n + m,) of the frames that agree.

@@ -6,10 +6,8 @@ Run as ``python -m kmn_skill.plan_doors --mode pull --doors 100``.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.kinematic_model import KinematicModel
 from kmn_skill.experiment import MODES, Experiment
 from kmn_skill.make_prototypes import HOME
@@ -107,7 +105,7 @@ def main() -> int:
     print(table(result))
     if options.json:
         named = {"mode": options.mode, "seed": options.seed}
-        Path(options.json).write_text(json.dumps({**named, **result}, indent=2) + "\n", "utf-8")
+        write_json(options.json, {**named, **result})
     return 0
 
 

@@ -82,8 +82,6 @@ class PlannerSettings(NamedTuple):
         Of the constraints, above which the first solution is given up.
     time_limit, attempt_limit, start_limit
         Seconds for a plan, for one first guess, and for the planner's process to start.
-    coarse_options, fine_options
-        Of the solver.
     """
 
     coarse: int
@@ -96,8 +94,6 @@ class PlannerSettings(NamedTuple):
     time_limit: float
     attempt_limit: float
     start_limit: float
-    coarse_options: dict[str, float]
-    fine_options: dict[str, float]
 
 
 class TimingSettings(NamedTuple):
@@ -134,11 +130,12 @@ class CheckSettings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SkillSettings:
-    """All of the file."""
+    """All of the file; ``solver`` are options of the augmented Lagrangian, by their names."""
 
     grasp: GraspSettings
     policy: PolicySettings
     planner: PlannerSettings
+    solver: dict[str, float]
     timing: TimingSettings
     check: CheckSettings
 
@@ -151,7 +148,8 @@ class SkillSettings:
         return cls(
             grasp=_grasp(section.section("grasp")),
             policy=_policy(section.section("policy")),
-            planner=_planner(section.section("planner"), section.section("solver")),
+            planner=_planner(section.section("planner")),
+            solver=_options(section.section("solver")),
             timing=TimingSettings(**_numbers(section.section("timing"), TimingSettings._fields)),
             check=_check(section.section("check")),
         )
@@ -195,10 +193,8 @@ def _names(section: Section, key: str) -> tuple[str, ...]:
     return tuple(values)
 
 
-def _planner(section: Section, solver: Section) -> PlannerSettings:
-    names = set(PlannerSettings._fields) - {"coarse_options", "fine_options"}
-    section.allow(sorted(names))
-    solver.allow(("coarse", "fine"))
+def _planner(section: Section) -> PlannerSettings:
+    section.allow(PlannerSettings._fields)
     return PlannerSettings(
         coarse=section.whole_number("coarse", 3, 100),
         fine=section.whole_number("fine", 3, 1000),
@@ -210,8 +206,6 @@ def _planner(section: Section, solver: Section) -> PlannerSettings:
         time_limit=section.number("time_limit", 0.0),
         attempt_limit=section.number("attempt_limit", 0.0),
         start_limit=section.number("start_limit", 0.0),
-        coarse_options=_options(solver.section("coarse")),
-        fine_options=_options(solver.section("fine")),
     )
 
 

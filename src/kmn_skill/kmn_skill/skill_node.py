@@ -12,12 +12,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -30,11 +28,14 @@ from visualization_msgs.msg import MarkerArray
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.messages import MessageError
+from kmn_perception.node_reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros_parameters import declare_parameters, read_parameters
 from kmn_skill import messages
 from kmn_skill.diagnostics import SkillStatistics
+from kmn_skill.door_memory import DoorMemory
 from kmn_skill.errors import DoorError
 from kmn_skill.execution import Part
-from kmn_skill.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_skill.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_skill.opening import SUCCESS, DoorOpening, Feedback, Goal, Result
 from kmn_skill.perceived_door import PerceivedDoor
 from kmn_skill.plan import Plan
@@ -42,9 +43,7 @@ from kmn_skill.planner import Planner
 from kmn_skill.robot import Robot
 from kmn_skill.states import StateWatch
 
-DIAGNOSTICS_PERIOD = 1.0  # seconds
 FEEDBACK_PERIOD = 0.1  # seconds
-WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
 QUEUE_DEPTH = 10
 
 
@@ -61,19 +60,21 @@ class SkillNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
-        declare_parameters(self)
-        self._settings = settings = NodeSettings.check(read_parameters(self))
+        self._settings = settings = NodeSettings.check(
+            declare_parameters(self, "skill_node", DESCRIPTORS)
+        )
         robot_joints = Robot.load().joint_names
         self._joints = {
             "joint_states": robot_joints,
             "door_state": tuple(joint.name for joint in settings.model.joints),
         }
         self._door = PerceivedDoor(settings.model, settings.world_frame, settings.door)
+        self._memory = DoorMemory()
         self._watch = StateWatch(settings.states, robot_joints)
         self._ending = ExitStack()
         self._planner = self._ending.enter_context(Planner(settings.skill))
         self._statistics = SkillStatistics()
-        self._warned: dict[str, float] = {}
+        self._warnings = ThrottledWarnings(self)
         self._busy, self._closing = False, False
         self._worker: threading.Thread | None = None  # of the goal
         self._fed_back, self._phase = 0.0, ""
@@ -97,9 +98,13 @@ class SkillNode(Node):
         """Publish a plan as markers."""
         report, model = plan.report, self._settings.model
         self._statistics.plan(report.planning_time)
+        door = ", ".join(
+            f"{parameter.name} {value:.3f}"
+            for parameter, value in zip(model.parameters, values, strict=True)
+        )
         self.get_logger().info(
-            f"plan of {report.duration:.1f} s found within {report.planning_time:.2f} s, "
-            f"clearance {report.clearance:.3f} m"
+            f"plan of {report.duration:.1f} s for the door {door}: found within "
+            f"{report.planning_time:.2f} s, clearance {report.clearance:.3f} m"
         )
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.world_frame)
         self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
@@ -123,17 +128,12 @@ class SkillNode(Node):
             JointTrajectory, "joint_trajectory", QUEUE_DEPTH
         )
         self._path_publisher = self.create_publisher(MarkerArray, "planned_path", latched)
-        self._diagnostics_publisher = self.create_publisher(
-            DiagnosticArray, "/diagnostics", QUEUE_DEPTH
-        )
         for topic in self._joints:
             self.create_subscription(JointState, topic, partial(self._on_state, topic), 1)
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self._on_parameters_of_door, QUEUE_DEPTH
         )
-        # A steady clock: reports go on when a simulated time stops or jumps.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
+        report_periodically(self, self._report)
         self._server = ActionServer(
             self,
             OpenDoor,
@@ -152,8 +152,9 @@ class SkillNode(Node):
         breaks = self._watch.breaks
         self._watch.put(topic, sample)
         if self._watch.breaks != breaks:
-            self._door.forget()
-            self._warn("break", f"another world: {self._watch.last_break}")
+            self._door.forget(sample.time)
+            self._memory.forget()
+            self._warnings.warn("break", f"another world: {self._watch.last_break}")
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
         try:
@@ -170,7 +171,7 @@ class SkillNode(Node):
             return GoalResponse.ACCEPT
         text = "goal rejected: another one runs, which must end or be cancelled first"
         self._statistics.reject(text)
-        self._warn("rejected", text)
+        self._warnings.warn("rejected", text)
         return GoalResponse.REJECT
 
     async def _on_open_door(self, goal_handle: ServerGoalHandle) -> OpenDoor.Result:
@@ -197,6 +198,7 @@ class SkillNode(Node):
         opening = DoorOpening(
             settings.model,
             self._door,
+            self._memory,
             self._watch,
             self._planner,
             self,
@@ -234,35 +236,23 @@ class SkillNode(Node):
 
     def _refuse(self, reason: str, text: str) -> None:
         self._statistics.refuse(reason)
-        self._warn(reason, text)
+        self._warnings.warn(reason, text)
 
-    def _warn(self, key: str, text: str) -> None:
-        """Log a warning, but not more often than once in a period for each key."""
-        now = time.monotonic()
-        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
-            self._warned[key] = now
-            self.get_logger().warning(text)
-
-    def _report(self) -> None:
+    def _report(self) -> list[DiagnosticStatus]:
         try:
             self._door.values(self.now())
             doubt = ""
         except DoorError as error:
             doubt = str(error)
-        name = self.get_fully_qualified_name()
-        report = DiagnosticArray(status=self._statistics.report(name, doubt))
-        report.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics_publisher.publish(report)
+        return self._statistics.report(self.get_fully_qualified_name(), doubt)
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason.
 
         A goal that runs goes on with those that it began with.
         """
-        values = read_parameters(self)
-        values.update((p.name, p.value) for p in parameters if p.name in values)
         try:
-            settings = NodeSettings.check(values)
+            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings

@@ -67,9 +67,7 @@ class Solver:
         settings = self._settings
         slices, around = settings.planner.coarse, pairs(settings.policy, world)
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        path, violation = optimise(
-            policy.problem, guess, settings.planner.coarse_options, settings.planner.noise
-        )
+        path, violation = optimise(policy.problem, self._disturbed(guess), settings.solver)
         if violation > settings.planner.violation:
             raise PlanRejected("no motion was found that fulfils all constraints")
         return path
@@ -83,29 +81,30 @@ class Solver:
         around = near_pairs(world, around, path, settings.planner.near)
         slices = settings.planner.fine
         policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        finer = refine(path, self._start(request), slices)
-        return optimise(
-            policy.problem, finer, settings.planner.fine_options, settings.planner.noise
-        )[0]
+        start = np.concatenate([request.start, request.door_start])
+        finer = refine(self._disturbed(path), start, slices)
+        return optimise(policy.problem, finer, settings.solver)[0]
 
-    def _start(self, request: PlanRequest) -> NDArray[np.float64]:
-        return np.concatenate([request.start, request.door_start])
+    def _disturbed(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Add some noise (m and rad) to a coarse path (T, 13), the same each time.
+
+        On a guess that almost fulfils the constraints the solver ends at once, before it fulfils
+        them. Between the configurations of the coarse path the noise is smooth: from a fine path
+        that trembles the first steps are wild and lead into obstacles.
+        """
+        generator = np.random.default_rng(0)
+        return path + generator.normal(0.0, self._settings.planner.noise, path.shape)
 
 
 def optimise(
-    problem: Any, guess: NDArray[np.float64], options: Mapping[str, float], noise: float
+    problem: Any, guess: NDArray[np.float64], options: Mapping[str, float]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return where the solver ends (T, 13), and how much it violates the constraints.
-
-    The guess gets some noise (m and rad), the same each time: on a guess that almost fulfils the
-    constraints the solver ends at once, before it fulfils them.
-    """
+    """Return where the solver ends (T, 13), and how much it violates the constraints."""
     program = problem.nlp()
     low, high = program.getBounds()
-    first = guess.reshape(-1) + np.random.default_rng(0).normal(0.0, noise, guess.size)
-    first = np.where(low < high, np.clip(first, low, high), first)
+    first = guess.reshape(-1)
     solver = ry.NLP_Solver(program, verbose=0)
     solver.setOptions(verbose=0, **options)
-    solver.setInitialization(first)
+    solver.setInitialization(np.where(low < high, np.clip(first, low, high), first))
     result = solver.solve(resampleInitialization=0)
     return np.array(result.x).reshape(guess.shape), float(result.eq + result.ineq)

@@ -92,8 +92,15 @@ def test_a_clock_that_was_set_back_is_another_world() -> None:
 
 def test_what_is_forgotten_must_be_seen_anew() -> None:
     perceived = door(seen(0.1), seen(0.2), seen(0.3))
-    perceived.forget()
+    perceived.forget(0.5)
     assert reason(perceived) == "none"
+    perceived.add(seen(0.4))  # came late
+    assert reason(perceived) == "none"
+    other = VALUES.copy()
+    other[1] += 0.05
+    for time in (0.5, 0.6, 0.7):
+        perceived.add(seen(time, other))
+    np.testing.assert_allclose(perceived.values(0.7), other)
 
 
 BAD = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
@@ -19,10 +18,11 @@ from rclpy.utilities import remove_ros_args
 from kmn_perception.benchmark import stages, transport
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.estimator import MorphEstimator
-from kmn_perception.node_parameters import NodeSettings, declare_parameters, read_parameters
+from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.ros_parameters import declare_parameters
 
 THREADS = 1  # of torch; as morph_node sets it
 
@@ -44,8 +44,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
     """Measure stages and transport with the parameters of morph_node, as written to JSON."""
-    declare_parameters(node)
-    settings = NodeSettings.check(read_parameters(node))
+    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     torch.set_num_threads(THREADS)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)
@@ -88,7 +87,7 @@ def main() -> None:
         result = benchmark(Node("benchmark"), options.frames)
         print(report(result))
         if options.json:
-            options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+            write_json(options.json, result)
     except KeyboardInterrupt:
         sys.exit("benchmark: interrupted")
     except (OSError, ParameterException, ValueError) as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shlex
 import sys
@@ -14,7 +13,7 @@ from typing import Any
 from tqdm import tqdm
 
 from kmn_perception import resources
-from kmn_perception.command_line import output_file, whole_number
+from kmn_perception.command_line import output_file, whole_number, write_json
 from kmn_perception.configuration import ConfigurationError
 from kmn_perception.evaluation.comparison import NAMES, Comparison, Request
 from kmn_perception.evaluation.hashes import short_hash
@@ -119,7 +118,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         result = evaluate(request, options.samples, options.jobs, settings)
         print(report(result, settings.paper.get(result["model"], {})))
         if options.json:
-            options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+            write_json(options.json, result)
     except KeyboardInterrupt:
         sys.exit("evaluate: interrupted")
     except (ConfigurationError, MethodError, OSError, WeightsError) as error:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kmn_perception.command_line import whole_number
+from kmn_perception.command_line import whole_number, write_json
 from kmn_perception.configuration import ConfigurationError
 from kmn_perception.evaluation.comparison import LIMIT, Comparison, Request
 from kmn_perception.evaluation.evaluate import command, configuration_hash, evaluate
@@ -73,7 +73,7 @@ def result_of(
             print(f"{file}: taken over, nothing has changed", file=sys.stderr)
             return earlier
     result = evaluate(request, samples, jobs, settings)
-    file.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    write_json(file, result)
     return result
 
 

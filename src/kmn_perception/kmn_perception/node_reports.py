@@ -1,0 +1,53 @@
+"""What a node says of itself: warnings, and what it reports on ``/diagnostics``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+
+REPORT_PERIOD = 1.0  # seconds
+WARNING_PERIOD = 5.0  # seconds between two warnings of the same kind
+QUEUE_DEPTH = 10
+
+
+class ThrottledWarnings:
+    """Logs warnings of a node, but not more often than once in a period for each key."""
+
+    def __init__(self, node: Node) -> None:
+        self._logger = node.get_logger()
+        self._warned: dict[str, float] = {}
+
+    def warn(self, key: str, text: str) -> None:
+        """Log a warning, unless there was one with this key just before."""
+        now = time.monotonic()
+        if now - self._warned.get(key, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[key] = now
+            self._logger.warning(text)
+
+
+def report_periodically(node: Node, report: Callable[[], list[DiagnosticStatus]]) -> None:
+    """Publish what ``report`` returns on ``/diagnostics`` once in a period."""
+    publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QUEUE_DEPTH)
+
+    def publish() -> None:
+        message = DiagnosticArray(status=report())
+        message.header.stamp = node.get_clock().now().to_msg()
+        publisher.publish(message)
+
+    # A steady clock: reports go on when a simulated time stops or jumps.
+    node.create_timer(REPORT_PERIOD, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
+def make_status(name: str, warn: bool, message: str, values: Mapping[str, str]) -> DiagnosticStatus:
+    """Return a status of ``name``, which warns or is OK."""
+    return DiagnosticStatus(
+        level=DiagnosticStatus.WARN if warn else DiagnosticStatus.OK,
+        name=name,
+        message=message,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )

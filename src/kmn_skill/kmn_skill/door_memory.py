@@ -1,0 +1,37 @@
+"""Where the door was: a robot that has driven up to it may hide it from the camera."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class DoorMemory:
+    """Keeps the parameters of the closed door that were last relied upon; thread-safe."""
+
+    def __init__(self) -> None:
+        self._kept: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    def keep(self, values: NDArray[np.float64], robot: NDArray[np.float64]) -> None:
+        """Keep parameters (n + m,) that were seen with the robot (11,) at some place [m, rad]."""
+        self._kept = values, robot
+
+    def forget(self) -> None:
+        """Forget the door, as of another world."""
+        self._kept = None
+
+    def recall(self, robot: NDArray[np.float64], distance: float) -> NDArray[np.float64] | None:
+        """Return the parameters (n + m,) if the robot has driven since they were seen.
+
+        Parameters
+        ----------
+        robot
+            (11,) present positions; x and y of the base first.
+        distance
+            Metres that it must have driven; a robot that still stands where it saw the door does
+            not hide it.
+        """
+        if (kept := self._kept) is None:
+            return None
+        values, before = kept
+        return values if np.linalg.norm(robot[:2] - before[:2]) > distance else None

@@ -1,0 +1,147 @@
+"""A client of the whole system: it sends goals, and sees what becomes of them."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from action_msgs.msg import GoalStatus
+from numpy.typing import NDArray
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.action import ActionClient  # type: ignore[attr-defined]
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import Marker, MarkerArray
+
+from graph import GraphClient
+from kmn_msgs.action import OpenDoor
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.ros_parameters import request_to_set
+from kmn_sim.sim_node import SimNode
+
+SEED = 3  # of a door that is wholly in view
+SPEED = 4.0  # simulated seconds in one second
+CAMERA_RATE = 0.5  # frames a simulated second
+SILENCE = 2.0  # seconds after which a slow machine has perceived all
+PULL = {"handle_angle": -0.7, "door_angle": -0.9}
+
+
+def seconds(message: JointState | MorphingParameters) -> float:
+    """Return the stamp of a message in seconds."""
+    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
+
+
+class DoorClient(GraphClient):
+    """Starts and stops the simulator, sends goals, and keeps what the nodes publish."""
+
+    def __init__(self, graph: Any) -> None:
+        super().__init__(graph, "skill_node")
+        self.joints: list[JointState] = []
+        self.doors: list[JointState] = []
+        self.sent: list[JointTrajectory] = []
+        self.paths: list[list[Marker]] = []
+        self.feedback: list[OpenDoor.Feedback] = []
+        self.perceived: list[MorphingParameters] = []
+        for kind, name, kept in (
+            (JointState, "joint_states", self.joints),
+            (JointState, "door_state", self.doors),
+            (JointTrajectory, "joint_trajectory", self.sent),
+            (MorphingParameters, "morphing_parameters", self.perceived),
+        ):
+            self.create_subscription(kind, name, kept.append, 10)
+        self.create_subscription(MarkerArray, "planned_path", self._keep_path, 10)
+        self.parameters = self.create_publisher(MorphingParameters, "morphing_parameters", 10)
+        self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
+        self.reset = self.create_client(Trigger, "reset")
+        self.action = ActionClient(self, OpenDoor, "open_door")
+        self._simulator_setting = self.create_client(
+            SetParametersAtomically, "sim_node/set_parameters_atomically"
+        )
+        self._simulator = ExitStack()
+
+    def _keep_path(self, message: MarkerArray) -> None:
+        self.paths.append(message.markers)
+
+    def start_simulator(self) -> None:
+        """Start a simulator, in which the robot and a door stand where they start."""
+        overrides = [
+            Parameter("real_time_factor", value=SPEED),
+            Parameter("publish_clock", value=True),
+            Parameter("placement", value="random"),
+            Parameter("seed", value=SEED),
+            Parameter("camera_rate", value=CAMERA_RATE),
+        ]
+        self._simulator.enter_context(self.graph.running(SimNode, parameter_overrides=overrides))
+        self.joints.clear()
+        self.graph.wait_for(lambda: self.joints and self.doors)
+
+    def stop_simulator(self) -> None:
+        self._simulator.close()
+
+    def set_simulator(self, **values: Any) -> SetParametersResult:
+        """Set parameters of the simulator, all or none."""
+        return self.call(self._simulator_setting, request_to_set(values)).result
+
+    def send(self, **angles: float) -> Any:
+        """Send a goal, and return its handle."""
+        self.feedback.clear()
+        self.sent.clear()
+        goal = OpenDoor.Goal(**{**PULL, **angles})
+        return self.wait(
+            self.action.send_goal_async(goal, lambda m: self.feedback.append(m.feedback))
+        )
+
+    def result(self, handle: Any) -> tuple[int, OpenDoor.Result]:
+        answer = self.wait(handle.get_result_async())
+        return answer.status, answer.result
+
+    def fail(self, **angles: float) -> str:
+        """Send a goal that must end without success, and return the reason."""
+        status, result = self.result(self.send(**angles))
+        assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)
+        return str(result.reason)
+
+    def wait_for_phase(self, phase: str, progress: float = 0.0) -> None:
+        self.graph.wait_for(
+            lambda: any(f.phase == phase and f.progress >= progress for f in self.feedback)
+        )
+
+    def positions(self) -> NDArray[np.float64]:
+        """Wait for a state, and return the robot's positions."""
+        self.joints.clear()
+        return np.array(self.graph.wait_for(lambda: self.joints)[-1].position)
+
+    def start_anew(self) -> None:
+        """Put the robot and the door where they start, and wait until the door was seen there."""
+        assert self.call(self.reset, Trigger.Request()).success
+        self.joints.clear()
+        now = seconds(self.graph.wait_for(lambda: self.joints)[-1])
+        self.graph.wait_for(lambda: self.perceived and seconds(self.perceived[-1]) > now)
+
+    def wait_until_no_more_is_perceived(self) -> None:
+        """Wait until what was exposed before is perceived, too."""
+        count = -1
+        while len(self.perceived) > count:
+            count = len(self.perceived)
+            time.sleep(SILENCE)
+
+    def assert_it_opens(self) -> None:
+        """Assert that the door opens from its start."""
+        self.start_anew()
+        status, result = self.result(self.send())
+        assert result.reason == ""
+        assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)
+        assert self.doors[-1].position[0] < -0.8
+
+    def assert_it_holds(self) -> None:
+        """Assert that the last thing sent was to hold, and that the robot does."""
+        assert self.sent[-1].points == []
+        time.sleep(0.1)
+        before = self.positions()
+        time.sleep(0.3)
+        np.testing.assert_allclose(self.positions()[:10], before[:10], atol=0.01)

@@ -100,8 +100,7 @@ def _segment(
     """Integrate the likelihood along a direction, within the limits.
 
     Pixels far from the edges that are explained wrongly count as well. The edges count up to their
-    ends, so that the pixels that count do not change with them. Where even the best fit leaves much
-    unexplained, neighbouring pixels are wrong together, and each of them says the less.
+    ends, so that the pixels that count do not change with them.
     """
     depth_information = float(direction @ fit.depth_information @ direction)
 
@@ -112,9 +111,7 @@ def _segment(
         edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
         return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * way**2
 
-    least = loss(0.0)
-    doubt = 1.0 + least / problem.settings.segment_doubt
-    allowed = least + problem.settings.segment_rise * doubt
+    allowed = loss(0.0) + problem.settings.segment_rise
     low, high = (
         _last_allowed(loss, allowed, end) for end in _within_limits(problem, values, direction)
     )
@@ -123,7 +120,7 @@ def _segment(
     edges = np.linspace(low, high, POINTS + 1)
     ways = 0.5 * (edges[1:] + edges[:-1])
     losses = np.array([loss(way) for way in ways])
-    weights = np.exp((losses.min() - losses) / doubt)
+    weights = np.exp(losses.min() - losses)
     weights /= weights.sum()
     median = float(np.interp(0.5, np.append(0.0, np.cumsum(weights)), edges))
     cell = (high - low) / POINTS

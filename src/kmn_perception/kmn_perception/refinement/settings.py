@@ -123,8 +123,6 @@ class RefinementSettings:
         A direction is open when its standard deviation exceeds this share of half the range.
     segment_rise
         It ends where the negative log-likelihood has risen by this.
-    segment_doubt
-        The negative log-likelihood of the best fit that halves what its rise says.
     """
 
     min_points: int
@@ -140,7 +138,6 @@ class RefinementSettings:
     misfit: MisfitSettings
     weak: float
     segment_rise: float
-    segment_doubt: float
 
     @classmethod
     def load(cls, path: Path | None = None) -> RefinementSettings:
@@ -151,7 +148,6 @@ class RefinementSettings:
             (
                 "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts",
                 "damping", "limit_margin", "limit_softness", "misfit", "weak", "segment_rise",
-                "segment_doubt",
             )
         )  # fmt: skip
         return cls(
@@ -168,7 +164,6 @@ class RefinementSettings:
             misfit=_misfit(section.section("misfit")),
             weak=section.number("weak", 0.0, 1.0),
             segment_rise=section.number("segment_rise", 0.0, 1e3),
-            segment_doubt=section.number("segment_doubt", 1e-3, 1e6),
         )
 
 

@@ -106,7 +106,7 @@ def test_what_is_not_one_door_in_full_is_not_ok(door: MorphEstimator, kind: str)
 
 
 @pytest.mark.parametrize("share", [0.9, 0.97])
-def test_the_share_says_how_much_may_stand_before_a_door(door: MorphEstimator, share: float) -> None:
+def test_the_share_says_how_much_may_hide_a_door(door: MorphEstimator, share: float) -> None:
     """A sheet before the door hides and shows 5 % of its points."""
     whole = observe(door, THETA, GAMMA)
     points = whole.points.copy()

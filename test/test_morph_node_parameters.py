@@ -113,6 +113,7 @@ def test_values_that_are_wrong_together_change_nothing(client: Any, node: MorphN
         ({"max_range": 0.5}, "NO_OBJECT", "no point lies within 0.5 m"),
         ({"min_points": 100_000}, "TOO_FEW_POINTS", "at least 100000 are needed"),
         ({"max_residual": 0.0}, "NOT_CONVERGED", "from the model"),
+        ({"max_deviation": 0.0, "deviation_share": 0.8}, "NOT_CONVERGED", "80 % of the points lie"),
         ({"camera_pose": "support_plane"}, "NO_OBJECT", "no support plane"),
     ],
 )

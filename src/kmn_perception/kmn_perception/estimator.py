@@ -19,8 +19,6 @@ from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.rendering import depth_to_cloud, render
 from kmn_perception.residual import surface_distances
 
-MOST = 0.9  # share of the points that must lie on the model, whatever else they show
-
 
 class Status(IntEnum):
     """What an estimate is worth; equal to the constants of kmn_msgs/MorphingParameters."""
@@ -47,7 +45,9 @@ class EstimatorSettings:
     max_residual
         Largest median distance of the points to the predicted surface, metres.
     max_deviation
-        Largest distance of nine tenths of the points to the predicted surface, metres.
+        Largest distance of most points to the predicted surface, metres.
+    deviation_share
+        Share of the points that must lie within it, whatever the others show.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
     refine
@@ -59,6 +59,7 @@ class EstimatorSettings:
     min_points: int
     max_residual: float
     max_deviation: float
+    deviation_share: float
     limit_margin: float
     refine: bool
 
@@ -202,7 +203,8 @@ class MorphEstimator:
             doubt = self._doubt(change)
         theta, gamma = model.split(values)
         distances = surface_distances(model.unit_cubes(theta, gamma), points)
-        residual, deviation = np.quantile(distances, (0.5, MOST)).tolist()
+        shares = (0.5, self.settings.deviation_share)
+        residual, deviation = np.quantile(distances, shares).tolist()
         status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(
             theta=theta,
@@ -244,7 +246,7 @@ class MorphEstimator:
             )
         if not deviation <= settings.max_deviation:
             return Status.NOT_CONVERGED, (
-                f"a tenth of the points lies more than {deviation:.3f} m from the model, "
-                f"{settings.max_deviation:g} m are allowed: it is of another shape"
+                f"{100.0 * settings.deviation_share:g} % of the points lie up to {deviation:.3f} m "
+                f"from the model, {settings.max_deviation:g} m are allowed: it is of another shape"
             )
         return (Status.NOT_CONVERGED, doubt) if doubt else (Status.OK, "")

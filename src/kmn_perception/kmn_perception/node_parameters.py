@@ -160,9 +160,8 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     ),
     "min_points": whole("Objects of fewer points are not estimated.", 1, 1_000_000),
     "max_residual": real("Largest median distance of the points to the model [m].", 0.0, 10.0),
-    "max_deviation": real(
-        "Largest distance of nine tenths of the points to the model [m].", 0.0, 10.0
-    ),
+    "max_deviation": real("Largest distance of most points to the model [m].", 0.0, 10.0),
+    "deviation_share": real("Share of the points that must lie within max_deviation.", 0.5, 1.0),
     "limit_margin": real("Part of its range by which a parameter may exceed its limits.", 0.0, 1.0),
     "refine": anything("Fit the model to the observation after the predictions."),
 }

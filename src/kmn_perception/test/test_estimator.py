@@ -15,6 +15,7 @@ SETTINGS = EstimatorSettings(
     min_points=100,
     max_residual=0.03,
     max_deviation=0.1,
+    deviation_share=0.9,
     limit_margin=0.1,
     refine=True,
 )
@@ -102,6 +103,27 @@ def test_what_is_not_one_door_in_full_is_not_ok(door: MorphEstimator, kind: str)
     estimate = door.estimate(Observation(seen.astype(np.float32), door.model.camera))
     assert estimate.status is not Status.OK
     assert estimate.reason
+
+
+@pytest.mark.parametrize("share", [0.9, 0.97])
+def test_the_share_says_how_much_may_hide_a_door(door: MorphEstimator, share: float) -> None:
+    """A sheet before the door hides and shows 5 % of its points."""
+    whole = observe(door, THETA, GAMMA)
+    points = whole.points.copy()
+    order = np.argsort(np.linalg.norm(points[:, 1:] - np.median(points[:, 1:], axis=0), axis=1))
+    camera = door.model.camera.pose[:3, 3]
+    hidden = order[: round(0.05 * len(points))]
+    points[hidden] = camera + 0.85 * (points[hidden] - camera)
+    strict = MorphEstimator(
+        door.model, door.network, replace(SETTINGS, deviation_share=share), door.refinement
+    )
+    estimate = strict.estimate(replace(whole, points=points))
+    if share < 0.95:
+        assert (estimate.status, estimate.reason) == (Status.OK, "")
+        np.testing.assert_allclose(estimate.theta, THETA, atol=0.005)
+    else:
+        assert estimate.status is Status.NOT_CONVERGED
+        assert estimate.reason.startswith("97 % of the points lie up to 0.")
 
 
 def test_a_door_far_outside_is_not_ok(door: MorphEstimator) -> None:

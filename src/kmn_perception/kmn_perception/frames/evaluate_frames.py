@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
 from tqdm import tqdm
 
-from kmn_perception.command_line import output_file
+from kmn_perception.command_line import output_file, write_json
 from kmn_perception.frames.experiment import FrameResult, load_pipeline, run
 from kmn_perception.frames.figures import details, figures, method_table, object_table
 from kmn_perception.frames.labelled_frame import FramesError, read_frames
@@ -57,7 +56,7 @@ def main() -> int:
         overlays = draw(results, pipeline.estimator.model, settings)
         print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
     if options.json:
-        options.json.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        write_json(options.json, summary)
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,8 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
     is_open = variances > problem.settings.weak**2
     directions[:, is_open] = _disentangled(directions[:, is_open])
+    for i, j in combinations(np.flatnonzero(is_open), 2):
+        directions[:, [i, j]] = _more_open(problem, fit, directions[:, [i, j]])
     least = problem.settings.limit_softness**2
     values = fit.values
     for _ in range(PASSES if is_open.sum() > 1 else 1):
@@ -71,23 +74,43 @@ def _disentangled(basis: NDArray[np.float64]) -> NDArray[np.float64]:
     return basis / np.linalg.norm(basis, axis=0)
 
 
+def _more_open(problem: Problem, fit: Fit, pair: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a pair of open directions (P, 2), or their sum and difference if these lead farther.
+
+    Where but one end of an object is hidden, neither its size nor its place alone is open, only
+    both together. The pair is scaled so that both move the surface as far. Mostly the view shows at
+    once that neither leads far enough to be open; the segments are long work.
+    """
+    half = problem.half_range[:, None]
+    weights = problem.pixels_per_unit(fit.values)[:, None]
+    alike = pair / np.linalg.norm(weights * half * pair, axis=0)
+    turned = np.column_stack([alike[:, 0] + alike[:, 1], alike[:, 0] - alike[:, 1]])
+    turned /= np.linalg.norm(turned, axis=0)
+    if not any(_leads_far(problem, fit, direction) for direction in (half * turned).T):
+        return pair
+    variances = [
+        max(
+            _segment(problem, fit, fit.values, direction).variance for direction in (half * basis).T
+        )
+        for basis in (pair, turned)
+    ]
+    return turned if variances[1] > variances[0] else pair
+
+
+def _leads_far(problem: Problem, fit: Fit, direction: NDArray[np.float64]) -> bool:
+    """Return whether the segment along a direction may be so long that it is open."""
+    loss = _loss_along(problem, fit, fit.values, direction)
+    allowed = loss(0.0) + problem.settings.segment_rise
+    low, high = _within_limits(problem, fit.values, direction)
+    far = problem.settings.weak
+    return any(low <= way <= high and loss(way) <= allowed for way in (-far, far))
+
+
 def _segment(
     problem: Problem, fit: Fit, values: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> Segment:
-    """Integrate the likelihood along a direction, within the limits.
-
-    Pixels far from the edges that are explained wrongly count as well. The edges count up to their
-    ends, so that the pixels that count do not change with them.
-    """
-    depth_information = float(direction @ fit.depth_information @ direction)
-
-    pixels = min(len(problem.image.pixels), problem.settings.misfit.pixels)
-
-    def loss(way: float) -> float:
-        moved = values + way * direction
-        edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
-        return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * way**2
-
+    """Integrate the likelihood along a direction, within the limits."""
+    loss = _loss_along(problem, fit, values, direction)
     allowed = loss(0.0) + problem.settings.segment_rise
     low, high = (
         _last_allowed(loss, allowed, end) for end in _within_limits(problem, values, direction)
@@ -102,6 +125,25 @@ def _segment(
     median = float(np.interp(0.5, np.append(0.0, np.cumsum(weights)), edges))
     cell = (high - low) / POINTS
     return Segment(median, float(weights @ (ways - median) ** 2 + cell**2 / 12.0))
+
+
+def _loss_along(
+    problem: Problem, fit: Fit, values: NDArray[np.float64], direction: NDArray[np.float64]
+) -> Callable[[float], float]:
+    """Return the negative log-likelihood as a function of the way along a direction.
+
+    Pixels far from the edges that are explained wrongly count as well. The edges count up to their
+    ends, so that the pixels that count do not change with them.
+    """
+    depth_information = float(direction @ fit.depth_information @ direction)
+    pixels = min(len(problem.image.pixels), problem.settings.misfit.pixels)
+
+    def loss(way: float) -> float:
+        moved = values + way * direction
+        edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
+        return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * way**2
+
+    return loss
 
 
 def _last_allowed(loss: Callable[[float], float], allowed: float, end: float) -> float:

@@ -12,7 +12,7 @@ from kmn_perception.observation import Observation, empty_surroundings
 from kmn_perception.refinement.view import projection
 
 HALF = 0.5
-THICKNESS = 0.02  # metres; other objects are at least as thick
+THICKNESS = 0.004  # metres; other objects are at least as thick
 PRESUMED = 0.01  # metres by which presumed depths may be wrong
 LEAST_RANGE = 1e-6  # metres
 

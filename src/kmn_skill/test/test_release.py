@@ -1,0 +1,66 @@
+"""A hand that is at the handle lets go, and the plan from there passes the check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from kmn_skill.check import check
+from kmn_skill.make_prototypes import HOME
+from kmn_skill.plan import Plan, PlanRequest
+from kmn_skill.planner import Planner
+from kmn_skill.settings import SkillSettings
+
+POLICY = SkillSettings.load().policy
+FIRST = PlanRequest(np.zeros(3), np.zeros(4), np.array(HOME), np.zeros(2), -0.7, -0.9)
+
+
+@pytest.fixture(scope="module")
+def planner() -> Iterator[Planner]:
+    with Planner() as planner:
+        yield planner
+
+
+@pytest.fixture(scope="module")
+def plan(planner: Planner) -> Plan:
+    return planner.plan(FIRST)
+
+
+def stopped(plan: Plan, phase: str) -> PlanRequest:
+    """Return the request of a robot that was stopped in the middle of a phase."""
+    _, first, last = next(each for each in plan.phases if each.name == phase)
+    here = (first + last + 1) // 2
+    return PlanRequest(FIRST.theta, FIRST.gamma, plan.positions[here], plan.door[here], -0.7, -0.9)
+
+
+@pytest.mark.parametrize("phase", ["grasp", "press", "open"])
+def test_a_hand_at_the_handle_opens_and_draws_straight_back(
+    planner: Planner, plan: Plan, phase: str
+) -> None:
+    request = stopped(plan, phase)
+    found = planner.plan(request)
+    assert check(found, request).clearance == found.report.clearance
+    assert [each.name for each in found.phases] == ["release", "reach", "grasp", "press", "open"]
+    for before, after in zip(found.phases, found.phases[1:], strict=False):
+        assert before.last == after.first
+    _, first, last = found.phases[0]
+    released = found.positions[first : last + 1]
+    np.testing.assert_array_equal(
+        released[:, 2:10], request.start[None, 2:10].repeat(len(released), 0)
+    )
+    way = np.linalg.norm(released[:, :2] - request.start[:2], axis=1)
+    assert way[-1] == pytest.approx(-POLICY.pre_grasp)
+    assert (released[way > 0.0, 10] >= POLICY.open_gripper).all()
+    assert not found.velocities[[first, last]].any()
+    assert found.door[last] == pytest.approx([request.door_start[0], 0.0])
+
+
+def test_a_hand_that_is_on_its_way_has_nothing_to_let_go(planner: Planner, plan: Plan) -> None:
+    _, first, last = plan.phases[0]
+    quarter = (first + last) // 4
+    request = PlanRequest(
+        FIRST.theta, FIRST.gamma, plan.positions[quarter], plan.door[quarter], -0.7, -0.9
+    )
+    assert planner.plan(request).phases[0].name == "reach"

@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_skill.plan import PlanRequest
-from kmn_skill.settings import PolicySettings
+from kmn_skill.settings import SkillSettings
 from kmn_skill.world import GRASP, TOOL, World
 
-SLICES = 20  # configurations in which it opens, and in which it draws back
 
-
-def release(world: World, request: PlanRequest, settings: PolicySettings) -> NDArray[np.float64]:
+def release(world: World, request: PlanRequest, settings: SkillSettings) -> NDArray[np.float64]:
     """Return how the hand lets go (R, 13) after the start; R = 0 if it is not at the handle.
 
     It is there when it is nearer than the pre-grasp pose. The gripper opens where it is, and the
@@ -20,13 +18,14 @@ def release(world: World, request: PlanRequest, settings: PolicySettings) -> NDA
     """
     start = np.concatenate([request.start, request.door_start])
     tool, grasp = world.poses(start[None], [TOOL, GRASP])[0]
-    distance = -settings.pre_grasp
+    distance = -settings.policy.pre_grasp
     if np.linalg.norm(tool[:3, 3] - grasp[:3, 3]) >= distance:
         return np.empty((0, start.size))
-    steps = np.arange(1, SLICES + 1)[:, None] / SLICES
+    slices = settings.planner.release
+    steps = np.arange(1, slices + 1)[:, None] / slices
     smooth = steps**2 * (3.0 - 2.0 * steps)  # from rest to rest
     opened = start.copy()
-    opened[10], opened[12] = max(start[10], settings.open_gripper), 0.0
+    opened[10], opened[12] = max(start[10], settings.policy.open_gripper), 0.0
     drawn_back = opened.copy()
     drawn_back[:2] -= distance * tool[:2, 0] / np.linalg.norm(tool[:2, 0])
     return np.concatenate(

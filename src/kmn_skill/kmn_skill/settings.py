@@ -72,6 +72,8 @@ class PlannerSettings(NamedTuple):
     ----------
     coarse, fine
         Configurations a phase of the first and of the final solution.
+    release
+        Configurations in which the hand lets go of the handle, and in which it draws back.
     near
         Pairs that are further apart in the first solution are left out in the final one, metres.
     attempts, spread
@@ -86,6 +88,7 @@ class PlannerSettings(NamedTuple):
 
     coarse: int
     fine: int
+    release: int
     near: float
     attempts: int
     spread: float
@@ -198,6 +201,7 @@ def _planner(section: Section) -> PlannerSettings:
     return PlannerSettings(
         coarse=section.whole_number("coarse", 3, 100),
         fine=section.whole_number("fine", 3, 1000),
+        release=section.whole_number("release", 3, 1000),
         near=section.number("near", 0.0),
         attempts=section.whole_number("attempts", 1, 100),
         spread=section.number("spread", 0.0),

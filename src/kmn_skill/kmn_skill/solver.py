@@ -50,7 +50,7 @@ class Solver:
             If the solution does not pass.
         """
         world, timing = self.world(request.theta, request.gamma), self._settings.timing
-        first = np.vstack([_start(request), release(world, request, self._settings.policy)])
+        first = np.vstack([_start(request), release(world, request, self._settings)])
         begin = replace(request, start=first[-1, :11], door_start=first[-1, 11:])
         path = self._solve(world, begin, transfer(guess, self.model, begin))
         plan = timed_plan(path, begin, self._robot, timing)

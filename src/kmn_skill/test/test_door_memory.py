@@ -37,10 +37,15 @@ def test_the_door_is_recalled_once_the_robot_has_driven(
 
 def test_what_was_seen_last_is_recalled() -> None:
     memory = DoorMemory()
-    assert not memory.interrupted
     memory.keep(DOOR + 1.0, robot(0.0, 0.0))
-    assert memory.interrupted
     memory.keep(DOOR, robot(1.0, 0.0))
     recalled = memory.recall(robot(2.0, 0.0), 0.1)
     assert recalled is not None
     np.testing.assert_array_equal(recalled, DOOR)
+
+
+def test_what_was_relied_upon_anew_has_not_come_to_its_end() -> None:
+    memory = DoorMemory()
+    memory.interrupted = False
+    memory.keep(DOOR, robot(0.0, 0.0))
+    assert memory.interrupted

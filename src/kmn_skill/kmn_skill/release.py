@@ -28,6 +28,6 @@ def release(world: World, request: PlanRequest, settings: SkillSettings) -> NDAr
     opened[10], opened[12] = max(start[10], settings.policy.open_gripper), 0.0
     drawn_back = opened.copy()
     drawn_back[:2] -= distance * tool[:2, 0] / np.linalg.norm(tool[:2, 0])
-    return np.concatenate(
-        [start + smooth * (opened - start), opened + smooth * (drawn_back - opened)]
-    )
+    path = [start + smooth * (opened - start), opened + smooth * (drawn_back - opened)]
+    # The start is as measured: a joint may stand a little beyond its limit.
+    return np.clip(np.concatenate(path), *world.limits())

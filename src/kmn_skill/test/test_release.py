@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,14 @@ def test_a_hand_at_the_handle_opens_and_draws_straight_back(
     assert (released[way > 0.0, 10] >= POLICY.open_gripper).all()
     assert not found.velocities[[first, last]].any()
     assert found.door[last] == pytest.approx([request.door_start[0], 0.0])
+
+
+def test_a_handle_that_stands_a_little_beyond_its_limit_is_no_hindrance(
+    planner: Planner, plan: Plan
+) -> None:
+    request = stopped(plan, "grasp")
+    request = replace(request, door_start=np.array([0.0, 3e-4]))
+    assert planner.plan(request).phases[0].name == "release"
 
 
 def test_a_hand_that_is_on_its_way_has_nothing_to_let_go(planner: Planner, plan: Plan) -> None:

@@ -73,6 +73,11 @@ def test_a_motion_is_no_break(watch: StateWatch) -> None:
     assert watch.breaks == 0
 
 
+def test_a_handle_that_springs_back_is_no_break(watch: StateWatch) -> None:
+    watch.put("door_state", Sample(10.02, np.array([-0.1, 0.5])))
+    assert watch.breaks == 0
+
+
 @pytest.mark.parametrize(
     ("topic", "sample", "text"),
     [

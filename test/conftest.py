@@ -16,8 +16,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from graph import Graph, GraphClient
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.morph_node import MorphNode
-from kmn_perception.node_parameters import DESCRIPTORS
+from kmn_perception.ros.morph_node import MorphNode
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS
 
 
 class Client(GraphClient):

@@ -21,8 +21,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from graph import GraphClient
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.ros_parameters import request_to_set
-from kmn_sim.sim_node import SimNode
+from kmn_perception.ros.parameters import request_to_set
+from kmn_sim.ros.sim_node import SimNode
 
 SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second

@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from kmn_perception.ros_parameters import request_to_set
+from kmn_perception.ros.parameters import request_to_set
 
 TIMEOUT = 120.0  # seconds until a test gives up to wait
 

@@ -16,10 +16,10 @@ from visualization_msgs.msg import Marker
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import cloud_from_points, image_from_depth, info_from_camera
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.transformation import transform_points
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.transformation import transform_points
+from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 
 NAN, INF = float("nan"), float("inf")
 MODEL = KinematicModel.load("door")

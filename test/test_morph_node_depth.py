@@ -10,12 +10,12 @@ import pytest
 from std_msgs.msg import Header
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.camera import Camera
-from kmn_perception.example_bag import load_frames
-from kmn_perception.messages import cloud_from_points, image_from_depth, info_from_camera
-from kmn_perception.morph_node import MorphNode
-from kmn_perception.rendering import depth_to_points
-from kmn_perception.resources import share_directory
+from kmn_perception.bags.example_bag import load_frames
+from kmn_perception.configuration.resources import share_directory
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_points
+from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
+from kmn_perception.ros.morph_node import MorphNode
 
 CAMERA = Camera.load("kinect_v1")
 FRAMES = load_frames()

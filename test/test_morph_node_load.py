@@ -10,9 +10,9 @@ import numpy as np
 from std_msgs.msg import Header
 
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import cloud_from_points
-from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.ros.messages import cloud_from_points
 
 FLOOD = 3000
 MODEL = KinematicModel.load("door")

@@ -12,12 +12,12 @@ from visualization_msgs.msg import Marker
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.camera import Camera
-from kmn_perception.example_bag import load_frames
-from kmn_perception.messages import cloud_from_points
-from kmn_perception.morph_node import MorphNode
-from kmn_perception.rendering import depth_to_points
-from kmn_perception.resources import share_directory
+from kmn_perception.bags.example_bag import load_frames
+from kmn_perception.configuration.resources import share_directory
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_points
+from kmn_perception.ros.messages import cloud_from_points
+from kmn_perception.ros.morph_node import MorphNode
 
 CAMERA = Camera.load("kinect_v1")
 FRAMES = load_frames()

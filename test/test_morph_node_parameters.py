@@ -16,14 +16,14 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.camera import Camera
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import cloud_from_points
-from kmn_perception.morph_node import MorphNode
-from kmn_perception.node_parameters import DESCRIPTORS
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.ros_parameters import ParameterError
-from kmn_perception.weights import WeightsError
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.network.weights import WeightsError
+from kmn_perception.ros.messages import cloud_from_points
+from kmn_perception.ros.morph_node import MorphNode
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS
+from kmn_perception.ros.parameters import ParameterError
 
 NAN = float("nan")
 SECONDS = count(1)  # every frame its own stamp

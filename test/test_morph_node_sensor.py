@@ -11,10 +11,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from numpy.typing import NDArray
 from std_msgs.msg import Header
 
-from kmn_perception.camera import Camera
-from kmn_perception.example_bag import load_frames
-from kmn_perception.messages import cloud_from_points, image_from_depth, info_from_camera
-from kmn_perception.rendering import depth_to_points
+from kmn_perception.bags.example_bag import load_frames
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_points
+from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 
 KINECT = Camera.load("kinect_v1")
 DEPTH = load_frames()[0]

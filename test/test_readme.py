@@ -7,8 +7,9 @@ from pathlib import Path
 
 import yaml
 
-from kmn_perception import executables, resources
-from kmn_perception.node_parameters import DESCRIPTORS
+from kmn_perception import executables
+from kmn_perception.configuration import resources
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 

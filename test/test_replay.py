@@ -32,9 +32,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
-from kmn_perception import replay as replay_module
-from kmn_perception.bags import BagError, Message, write_bag
-from kmn_perception.replay import Replay
+from kmn_perception.bags import replay as replay_module
+from kmn_perception.bags.replay import Replay
+from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
 
 STRING = "std_msgs/msg/String"
 PATIENCE = 20.0  # seconds; far more than anything here takes
@@ -230,7 +230,7 @@ def test_a_topic_that_is_not_recorded_is_refused(player: Node, talk: Path) -> No
 
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "kmn_perception.replay", *arguments],
+        [sys.executable, "-m", "kmn_perception.bags.replay", *arguments],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
         stderr=subprocess.PIPE,
         text=True,

@@ -13,10 +13,10 @@ import pytest
 from rclpy.time import Time
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception import resources
-from kmn_perception.bags import read_messages
-from kmn_perception.example_bag import make_example_bag
-from kmn_perception.morph_node import MorphNode
+from kmn_perception.bags.example_bag import make_example_bag
+from kmn_perception.bags.rosbag2 import read_messages
+from kmn_perception.configuration import resources
+from kmn_perception.ros.morph_node import MorphNode
 
 PICTURES = resources.share_directory() / "data" / "kinect_boxes"
 
@@ -49,7 +49,7 @@ def test_frames_from_another_process_are_answered_with_one_object_each(
 ) -> None:
     before = client.report()
     client.answers.clear()
-    command = [sys.executable, "-m", "kmn_perception.replay", str(bag), "--topics", *topics]
+    command = [sys.executable, "-m", "kmn_perception.bags.replay", str(bag), "--topics", *topics]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
     assert subprocess.run(command, env=environment, timeout=120, check=False).returncode == 0
     stamps = [message.stamp for message in read_messages(bag, topics[:1])]

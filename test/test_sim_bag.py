@@ -13,10 +13,10 @@ from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.bags import Message, write_bag
-from kmn_perception.morph_node import MorphNode
-from kmn_perception.replay import Replay
-from kmn_sim.sim_node import SimNode
+from kmn_perception.bags.replay import Replay
+from kmn_perception.bags.rosbag2 import Message, write_bag
+from kmn_perception.ros.morph_node import MorphNode
+from kmn_sim.ros.sim_node import SimNode
 
 FRAMES = 3
 TYPES = {"/points": "sensor_msgs/msg/PointCloud2"}

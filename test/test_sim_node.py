@@ -19,13 +19,13 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from graph import GraphClient
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import camera_from_info, depth_from_image, points_from_cloud
-from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.ros.messages import camera_from_info, depth_from_image, points_from_cloud
 
 pytest.importorskip("pybullet")
-from kmn_sim.messages import seconds, stamp_of  # noqa: E402
-from kmn_sim.sim_node import SimNode  # noqa: E402
+from kmn_sim.ros.messages import seconds, stamp_of  # noqa: E402
+from kmn_sim.ros.sim_node import SimNode  # noqa: E402
 
 ARM = ["l_shoulder_pan_joint", "l_elbow_flex_joint"]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import yaml
 
-from kmn_perception import resources
+from kmn_perception.configuration import resources
 from kmn_sim import executables
-from kmn_sim.node_parameters import DESCRIPTORS
+from kmn_sim.ros.sim_node_parameters import DESCRIPTORS
 
 PAGE = (Path(__file__).parents[1] / "docs/simulation.md").read_text(encoding="utf-8")
 

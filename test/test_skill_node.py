@@ -22,12 +22,12 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.morph_node import MorphNode
+from kmn_perception.ros.morph_node import MorphNode
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import CAMERA_RATE, PULL, SPEED, DoorClient  # noqa: E402
-from kmn_skill.skill_node import SkillNode  # noqa: E402
+from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 # With so slow a camera and so fast a clock.
 PATIENT = {

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from kmn_perception import resources
+from kmn_perception.configuration import resources
 from kmn_skill import executables
 
 pytest.importorskip("robotic")
-from kmn_skill.node_parameters import DESCRIPTORS  # noqa: E402
+from kmn_skill.ros.skill_node_parameters import DESCRIPTORS  # noqa: E402
 
 PAGE = (Path(__file__).parents[1] / "docs/skill.md").read_text(encoding="utf-8")
 

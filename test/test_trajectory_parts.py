@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_sim.interpolation import State
-from kmn_sim.messages import command_from_message
-from kmn_sim.trajectory_controller import TrajectoryController
-from kmn_skill.execution import Execution, ExecutionSettings
-from kmn_skill.messages import trajectory_from_part
-from kmn_skill.plan import Phase, Plan, PlanReport
-from kmn_skill.states import WorldState
+from kmn_sim.control.interpolation import State
+from kmn_sim.control.trajectory_controller import TrajectoryController
+from kmn_sim.ros.messages import command_from_message
+from kmn_skill.execution.plan_execution import Execution, ExecutionSettings
+from kmn_skill.execution.states import WorldState
+from kmn_skill.planning.plan import Phase, Plan, PlanReport
+from kmn_skill.ros.messages import trajectory_from_part
 
 STEP = 1.0 / 240.0  # seconds; of the physics
 NAMES = ("base_x", "base_y")

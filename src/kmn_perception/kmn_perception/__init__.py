@@ -1,1 +1,9 @@
-"""Kinematic Morphing Networks: from a depth camera to the morphing parameters of an object."""
+"""Kinematic Morphing Networks: from a depth camera to the morphing parameters of an object.
+
+The rooms, each of which imports only from those named before it: ``configuration`` (YAML files),
+``command_line``, ``model`` (the analytic models of object, camera and sensor), ``scene`` (from a
+frame to what may be objects), ``network`` (Algorithm 1) and ``refinement`` (the fit), beside each
+other; the two front doors `estimator` (one object) and `pipeline` (a frame); offline ``training``,
+``evaluation``, ``visualization`` and ``experiments``; ``ros`` (the node); and on top of it ``bags``
+and ``benchmark``.
+"""

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception import weights
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predict
-from kmn_perception.network import MorphNetwork
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.model.surface_distance import surface_distances
+from kmn_perception.network import weights
+from kmn_perception.network.morph import predict
+from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.refinement import RefinementSettings, refine
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.residual import surface_distances
 
 
 class Status(IntEnum):

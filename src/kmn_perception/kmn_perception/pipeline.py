@@ -10,20 +10,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
-from kmn_perception.fragments import find_parted
-from kmn_perception.intrinsics import camera_as_dense, camera_of_points
-from kmn_perception.object_settings import ObjectSettings
-from kmn_perception.observation import Observation
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.segmentation import SegmentationSettings, segment
-from kmn_perception.stacks import stands_on
-from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
-from kmn_perception.surroundings import surroundings, surroundings_of_cloud, touches_unseen
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.scene.free_space import free_space, free_space_of_cloud, is_truncated
+from kmn_perception.scene.intrinsics import camera_as_dense, camera_of_points
+from kmn_perception.scene.object_settings import ObjectSettings
+from kmn_perception.scene.occlusion import find_occluded_pairs
+from kmn_perception.scene.segmentation import SegmentationSettings, segment
+from kmn_perception.scene.stacking import stands_on
+from kmn_perception.scene.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 
 UPSIDE_DOWN = np.array([-1.0, -1.0, 1.0], dtype=np.float32)
-LEAST_TO_PART = 3  # two parts and what is in front of them
+MIN_TO_PART = 3  # two parts and what is in front of them
 
 
 class CameraPose(str, Enum):
@@ -108,15 +108,15 @@ class MorphPipeline:
         prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
         points = depth_to_points(render(prototype, model.camera), model.camera)
         find_support_plane(points, self.settings.plane)
-        # At any angle that is not 0 the surface's rounding errors have creases.
-        creased = replace(self.settings.background, cluster=True, cluster_crease=1e-9)
+        # At any angle that is not 0 the surface's rounding errors have concave edges.
+        split = replace(self.settings.background, cluster=True, cluster_concave_angle=1e-9)
         for cloud in (points, points.reshape(-1, 3)):
-            segment(cloud, model.camera.pose, np.zeros(3), creased)
+            segment(cloud, model.camera.pose, np.zeros(3), split)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
-        around = surroundings(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
+        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
         mask = np.isfinite(points[..., 2])
-        touches_unseen(mask, around.free_depth)
-        find_parted([mask], around.free_depth)
+        is_truncated(mask, around.free_depth)
+        find_occluded_pairs([mask], around.free_depth)
         self.estimator.warm_up()
 
     def estimate(self, points: NDArray[np.float32], in_world: bool = False) -> Estimate:
@@ -183,18 +183,18 @@ class MorphPipeline:
         if camera is not None:
             to_camera = camera.world_to_camera @ to_world
             border_run = self.settings.objects.border_run
-            around = surroundings(points, labels, to_camera, to_world, floor, border_run)
+            around = free_space(points, labels, to_camera, to_world, floor, border_run)
         views = []
         sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
         too_small = sizes < self.estimator.settings.min_points
         for label in np.argsort(too_small, kind="stable")[:most]:
             seen, mask = segments.of_object(label), labels == label
             if camera is not None:
-                cut = touches_unseen(mask, around.free_depth)
+                cut = is_truncated(mask, around.free_depth)
                 views.append(ObjectView(Observation(seen, camera, floor, around), mask, cut))
             else:
                 sensor = self._canonical_view(seen, pose)
-                beside = surroundings_of_cloud(segments.points, sensor, floor)
+                beside = free_space_of_cloud(segments.points, sensor, floor)
                 views.append(ObjectView(Observation(seen, sensor, floor, beside), mask, False))
         return views
 
@@ -230,11 +230,11 @@ class MorphPipeline:
 
     def _rejoined(self, views: list[ObjectView]) -> list[ObjectView]:
         """Join what something in front parts in the image, if one model explains both parts."""
-        around, mask = views[0].observation.surroundings, views[0].mask
-        if around is None or mask.shape != around.free_depth.shape or len(views) < LEAST_TO_PART:
+        around, mask = views[0].observation.free_space, views[0].mask
+        if around is None or mask.shape != around.free_depth.shape or len(views) < MIN_TO_PART:
             return views  # unorganised points have no image in which anything could part them
         owner = list(range(len(views)))  # the first of the parts to which a view belongs
-        for a, b in find_parted([view.mask for view in views], around.free_depth):
+        for a, b in find_occluded_pairs([view.mask for view in views], around.free_depth):
             first, second = sorted((owner[a], owner[b]))
             joined = None if first == second else self._joined(views[first], views[second])
             if joined is not None:

@@ -10,12 +10,12 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from kmn_perception import resources
-from kmn_perception.camera import Camera
+from kmn_perception.configuration import resources
 from kmn_perception.estimator import MorphEstimator
-from kmn_perception.node_parameters import NodeSettings
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.rendering import depth_to_points
+from kmn_perception.ros.morph_node_parameters import NodeSettings
 
 
 class RealFrame(NamedTuple):

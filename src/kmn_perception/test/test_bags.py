@@ -18,7 +18,14 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import String
 
-from kmn_perception.bags import BagError, Message, Topic, read_messages, read_topics, write_bag
+from kmn_perception.bags.rosbag2 import (
+    BagError,
+    Message,
+    Topic,
+    read_messages,
+    read_topics,
+    write_bag,
+)
 
 STORAGES = ("mcap", "sqlite3")
 TALKER = Path(__file__).parent / "data" / "talker"

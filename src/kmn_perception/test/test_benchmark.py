@@ -17,14 +17,14 @@ import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from kmn_perception import weights
 from kmn_perception.benchmark import arguments, benchmark
 from kmn_perception.benchmark.scene import WALL_DISTANCE, full_cloud
-from kmn_perception.cascade import Cascade, CascadeSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import points_from_cloud
-from kmn_perception.rendering import render
-from kmn_perception.transformation import transform_points
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import render
+from kmn_perception.model.transformation import transform_points
+from kmn_perception.network import weights
+from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.ros.messages import points_from_cloud
 
 COMMAND = [sys.executable, "-c", "from kmn_perception.benchmark import main; main()"]
 FRAMES = 5

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import yaml
 
-from kmn_perception import resources
-from kmn_perception.camera import Camera, look_at
-from kmn_perception.configuration import ConfigurationError
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.camera import Camera, look_at
 
 
 def test_door_camera_stands_where_the_author_put_it() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.evaluation.coverage import chi2_quantile, is_covered
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
 
 DOOR, BOX = KinematicModel.load("door"), KinematicModel.load("box")
 

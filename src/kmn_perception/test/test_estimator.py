@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
-from kmn_perception.observation import Observation
-from kmn_perception.rendering import depth_to_cloud, render
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
 
 SETTINGS = EstimatorSettings(
     iterations=10,

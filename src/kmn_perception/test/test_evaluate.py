@@ -19,14 +19,15 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kmn_perception import resources, weights
+from kmn_perception.configuration import resources
 from kmn_perception.evaluation.comparison import Measurement, Request
 from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.evaluate import evaluate, main
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.tally import Tally
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.paper_network import PaperNetwork
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network import weights
+from kmn_perception.network.paper_network import PaperNetwork
 from kmn_perception.training.samples import EVALUATION, sample
 
 BOX, BOX_A = KinematicModel.load("box"), KinematicModel.load("box_a")

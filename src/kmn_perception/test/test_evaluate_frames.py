@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.frames.baselines import BASELINES
-from kmn_perception.frames.labelled_frame import FramesError, read_frames
-from kmn_perception.frames.upright_box import UprightBox, errors, intersection_over_union
-from kmn_perception.resources import share_directory
+from kmn_perception.configuration.resources import share_directory
+from kmn_perception.experiments.baselines import BASELINES
+from kmn_perception.experiments.labelled_frame import FrameError, read_frames
+from kmn_perception.experiments.upright_box import UprightBox, errors, intersection_over_union
 
 SHIPPED = share_directory() / "data" / "kinect_boxes"
 KEYS = (
@@ -34,7 +34,7 @@ def _copy(folder: Path, *numbers: int) -> Path:
 
 def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "kmn_perception.frames.evaluate_frames", *map(str, arguments)],
+        [sys.executable, "-m", "kmn_perception.experiments.evaluate_frames", *map(str, arguments)],
         capture_output=True,
         text=True,
     )
@@ -87,16 +87,16 @@ def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None
     assert "holds no file *_d.png" in _evaluate(tmp_path).stderr
     _copy(tmp_path, 3)
     (tmp_path / "learn3_l.png").unlink()
-    with pytest.raises(FramesError, match="learn3_l.png is missing"):
+    with pytest.raises(FrameError, match="learn3_l.png is missing"):
         read_frames(tmp_path)
     cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint16))
-    with pytest.raises(FramesError, match="expected one channel of uint8"):
+    with pytest.raises(FrameError, match="expected one channel of uint8"):
         read_frames(tmp_path)
     cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((240, 320), dtype=np.uint8))
-    with pytest.raises(FramesError, match="labels of 320 x 240 pixels for a depth image of 640"):
+    with pytest.raises(FrameError, match="labels of 320 x 240 pixels for a depth image of 640"):
         read_frames(tmp_path)
     cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint8))
-    with pytest.raises(FramesError, match="0 measured pixels are labelled 1, expected a table"):
+    with pytest.raises(FrameError, match="0 measured pixels are labelled 1, expected a table"):
         read_frames(tmp_path)
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
-from kmn_perception.bags import read_messages, read_topics
-from kmn_perception.example_bag import TYPES, make_example_bag
+from kmn_perception.bags.example_bag import TYPES, make_example_bag
+from kmn_perception.bags.rosbag2 import read_messages, read_topics
 
 PICTURES = Path(__file__).parents[1] / "data" / "kinect_boxes"
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera, look_at
 from kmn_perception.evaluation.information_limit import best_estimate
 from kmn_perception.evaluation.observability import null_directions
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.rendering import render
+from kmn_perception.model.camera import Camera, look_at
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import render
 from kmn_perception.training.samples import EVALUATION, sample
 
 DOOR, BOX_C = KinematicModel.load("door"), KinematicModel.load("box_c")

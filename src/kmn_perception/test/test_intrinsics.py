@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.camera import Camera
-from kmn_perception.intrinsics import camera_as_dense, camera_of_points
-from kmn_perception.rendering import depth_to_cloud, depth_to_points
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_cloud, depth_to_points
+from kmn_perception.scene.intrinsics import camera_as_dense, camera_of_points
 
 from .conftest import RealFrame
 

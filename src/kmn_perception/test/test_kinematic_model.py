@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import yaml
 
-from kmn_perception import resources
-from kmn_perception.configuration import ConfigurationError
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.kinematic_model import KinematicModel
 
 MODELS = ("box_a", "box_b", "box_c", "box", "door")
 

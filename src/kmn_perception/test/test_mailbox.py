@@ -7,7 +7,7 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.mailbox import Mailbox
+from kmn_perception.ros.mailbox import Mailbox
 
 
 @given(st.lists(st.one_of(st.integers(), st.just("take"))))

@@ -17,8 +17,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
-from kmn_perception.camera import Camera
-from kmn_perception.messages import (
+from kmn_perception.model.camera import Camera
+from kmn_perception.ros.messages import (
     MessageError,
     cloud_from_points,
     image_from_depth,

@@ -7,13 +7,13 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from kmn_perception.cascade import Cascade, CascadeSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predict, predictions
-from kmn_perception.network import MorphNetwork
-from kmn_perception.observation import Observation
-from kmn_perception.paper_network import PaperNetwork
-from kmn_perception.rendering import depth_to_cloud, render
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.morph import predict, predictions
+from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.paper_network import PaperNetwork
 
 
 def constant_paper_network(model: KinematicModel, answer: list) -> PaperNetwork:

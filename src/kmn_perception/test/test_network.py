@@ -6,9 +6,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.encoding import ParameterEncoding
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.paper_network import PaperNetwork
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network.encoding import ParameterEncoding
+from kmn_perception.network.paper_network import PaperNetwork
 
 MODELS = {name: KinematicModel.load(name) for name in ("box_a", "box_b", "box_c", "box", "door")}
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera, look_at
 from kmn_perception.estimator import Status
+from kmn_perception.model.camera import Camera, look_at
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.pipeline import ObjectEstimate
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.sensor import add_noise
 
 from .conftest import RealFrame, tabletop_pipeline
 

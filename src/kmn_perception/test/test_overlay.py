@@ -12,8 +12,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera, look_at
-from kmn_perception.overlay import (
+from kmn_perception.model.camera import Camera, look_at
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.transformation import transform_points
+from kmn_perception.visualization.overlay import (
     ACCEPTED,
     EDGE_PIECES,
     OBJECT,
@@ -25,8 +27,6 @@ from kmn_perception.overlay import (
     save_picture,
     wireframe,
 )
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.transformation import transform_points
 
 CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5, look_at([-1.0, -1.2, 0.9], [0, 0, 0]))
 

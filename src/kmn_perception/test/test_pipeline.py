@@ -2,56 +2,24 @@
 
 from __future__ import annotations
 
-from types import ModuleType
+from importlib import import_module
+from pkgutil import walk_packages
 
 import numba
 
-from kmn_perception import (
-    creases,
-    fragments,
-    observation,
-    rendering,
-    residual,
-    segmentation,
-    surroundings,
-    union_find,
-    windows,
-)
+import kmn_perception
 from kmn_perception.estimator import Status
-from kmn_perception.refinement import (
-    capture,
-    correlation,
-    edges,
-    geometry,
-    image,
-    misfit,
-    planes,
-    silhouette,
-    view,
-)
 
 from .conftest import RealFrame, tabletop_pipeline
 
-COMPILED: tuple[ModuleType, ...] = (
-    capture,
-    correlation,
-    creases,
-    edges,
-    fragments,
-    geometry,
-    image,
-    misfit,
-    observation,
-    planes,
-    rendering,
-    residual,
-    segmentation,
-    silhouette,
-    surroundings,
-    union_find,
-    view,
-    windows,
-)
+ROOMS = ("model", "scene", "network", "refinement")  # whose compiled loops a frame runs
+COMPILED = [
+    import_module(found.name)
+    for room in ROOMS
+    for found in walk_packages(
+        [f"{kmn_perception.__path__[0]}/{room}"], f"{kmn_perception.__name__}.{room}."
+    )
+]
 
 
 def compiled_signatures() -> dict[str, int]:

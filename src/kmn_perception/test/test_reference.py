@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.frames.labelled_frame import LabelledFrame, read_frames
-from kmn_perception.frames.reference import Reference, measure
-from kmn_perception.frames.settings import FramesSettings
-from kmn_perception.frames.upright_box import UprightBox, errors, intersection_over_union
-from kmn_perception.rendering import render
-from kmn_perception.resources import share_directory
-from kmn_perception.sensor import add_noise
+from kmn_perception.configuration.resources import share_directory
+from kmn_perception.experiments.labelled_frame import LabelledFrame, read_frames
+from kmn_perception.experiments.reference import Reference, measure
+from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.experiments.upright_box import UprightBox, errors, intersection_over_union
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import render
+from kmn_perception.model.sensor_noise import add_noise
 
 CAMERA = Camera.load("kinect_v1")
 TABLE = UprightBox(np.array([0.0, 0.0, -0.05]), np.array([1.4, 1.6, 0.1]), 0.0)
 
 
-def _settings(camera: Camera = CAMERA) -> FramesSettings:
-    return replace(FramesSettings.load(), camera=camera)
+def _settings(camera: Camera = CAMERA) -> ExperimentSettings:
+    return replace(ExperimentSettings.load(), camera=camera)
 
 
 def _box(x: float, y: float, yaw_deg: float, size: Sequence[float]) -> UprightBox:

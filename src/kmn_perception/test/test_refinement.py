@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception import resources
-from kmn_perception.camera import look_at
-from kmn_perception.configuration import ConfigurationError
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.camera import look_at
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
 from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.training.samples import EVALUATION, observe, sample
@@ -190,7 +190,7 @@ def test_samples_of_the_evaluation_come_out_exactly() -> None:
     ("old", "new", "message"),
     [
         ("damping: 0.01", "damping: -1", "'damping' must be a number in"),
-        ("tries: ", "attempts: ", "capture: key 'tries' is missing"),
+        ("tries: ", "attempts: ", "reacquire: key 'tries' is missing"),
         ("window: 32", "window: 3200", "'window' must be a number in"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.training.samples import EVALUATION, observe, sample
 

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import render
 from kmn_perception.refinement.geometry import shape_of, unit_cubes_jacobian
-from kmn_perception.refinement.view import meet_any, projection, view_of
-from kmn_perception.rendering import render
+from kmn_perception.refinement.view import projection, raycast_any, view_of
 
 Vector = NDArray[np.float64]
 
@@ -129,7 +129,7 @@ def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[flo
     values, camera = within(model, share), model.camera.resized(64, 48)
     depth = render(model.unit_cubes(*model.split(values)), camera)
     view = view_of(shape_of(model), values, projection(camera))
-    met = np.array([[meet_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
+    met = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
     np.testing.assert_array_equal(met > 0.0, np.isfinite(depth))
     np.testing.assert_allclose(1.0 / met[met > 0.0], depth[met > 0.0], rtol=1e-5)
 

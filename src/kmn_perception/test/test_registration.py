@@ -20,10 +20,10 @@ from kmn_perception.evaluation.registration import (
     point_to_point,
 )
 from kmn_perception.evaluation.settings import EvaluationSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.transformation import rotation_z, transform_points
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.model.transformation import rotation_z, transform_points
 
 SETTINGS = EvaluationSettings.load()
 SMALL = st.floats(-0.02, 0.02)

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.camera import Camera
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import point_cloud_to_depth
-from kmn_perception.rendering import depth_to_cloud, depth_to_points, render
-from kmn_perception.transformation import transform_points
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.point_rendering import point_cloud_to_depth
+from kmn_perception.model.rendering import depth_to_cloud, depth_to_points, render
+from kmn_perception.model.transformation import transform_points
 
 AUTHOR = Path(__file__).parent / "data" / "author_scenes"
 SCENES = sorted(json.loads((AUTHOR / "parameters.json").read_text()).items())

@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.residual import surface_distances
-from kmn_perception.transformation import transform_points
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.surface_distance import surface_distances
+from kmn_perception.model.transformation import transform_points
 
 BOX = KinematicModel.load("box_b")
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from kmn_perception.evaluation.comparison import Request
-from kmn_perception.evaluation.figures.training import smooth
 from kmn_perception.evaluation.page import markdown
+from kmn_perception.evaluation.plots.training import smooth
 from kmn_perception.evaluation.results import main, result_of
 from kmn_perception.evaluation.settings import EvaluationSettings
 

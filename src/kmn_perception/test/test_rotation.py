@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.rotation import matrix_from_quaternion, quaternion_from_matrix
+from kmn_perception.model.rotation import matrix_from_quaternion, quaternion_from_matrix
 
 angles = st.floats(-np.pi, np.pi)
 axes = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 0.1)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.residual import surface_distances
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.surface_distance import surface_distances
 from kmn_perception.training.samples import sample
 from kmn_perception.training.settings import SensorSettings, TrainingSettings
 

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.segmentation import SegmentationSettings, remove_background
-from kmn_perception.support_plane import SupportPlaneSettings, find_support_plane, pose_above
-from kmn_perception.transformation import transform_points
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.transformation import transform_points
+from kmn_perception.scene.segmentation import SegmentationSettings, remove_background
+from kmn_perception.scene.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 
 from .conftest import cuboid
 
@@ -31,7 +31,7 @@ SETTINGS = SegmentationSettings(
     cluster=True,
     cluster_step=0.02,
     cluster_min_points=50,
-    cluster_crease=0.5,
+    cluster_concave_angle=0.5,
 )
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kmn_perception.sensor import add_noise
+from kmn_perception.model.sensor_noise import add_noise
 
 
 @pytest.mark.parametrize("z", [0.6, 1.0, 2.5])

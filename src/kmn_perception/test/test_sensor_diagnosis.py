@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.example_bag import load_frames
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.sensor import add_noise
-from kmn_perception.sensor_diagnosis import Description, DiagnosisSettings, diagnose
+from kmn_perception.bags.example_bag import load_frames
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.sensor_noise import add_noise
+from kmn_perception.scene.sensor_diagnosis import Description, DiagnosisSettings, diagnose
 
 KINECT = Camera.load("kinect_v1")
 SETTINGS = DiagnosisSettings.load()

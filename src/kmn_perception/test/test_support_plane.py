@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera, look_at
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.support_plane import (
+from kmn_perception.model.camera import Camera, look_at
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.scene.support_plane import (
     SupportPlane,
     SupportPlaneSettings,
     find_support_plane,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation, Surroundings
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import FreeSpace, Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.refinement import Refinement, RefinementSettings, refine
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.surroundings import EMPTY, UNKNOWN, surroundings, touches_unseen
+from kmn_perception.scene.free_space import EMPTY, UNKNOWN, free_space, is_truncated
 
 NONE = np.nan
 HIGH, ON_SUPPORT = 1.0, 0.0  # metres above the support
@@ -31,7 +31,7 @@ def row(*runs: tuple[float, float, int]) -> NDArray[np.float32]:
 def free(points: NDArray[np.float32]) -> NDArray[np.float32]:
     to_world = np.eye(4)[[1, 2, 0, 3]]  # the test's heights are in x
     nothing = np.full(points.shape[:2], -1, dtype=np.int32)
-    return surroundings(points, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth[0]
+    return free_space(points, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth[0]
 
 
 def test_pixels_are_empty_up_to_what_they_show_and_wholly_where_they_show_the_support() -> None:
@@ -52,10 +52,10 @@ def test_a_gap_is_empty_up_to_the_farther_one_of_those_beside_it() -> None:
 def test_a_gap_within_an_object_is_unknown() -> None:
     points = row((0.7, HIGH, 2), (NONE, HIGH, 3), (0.8, HIGH, 2))
     labels = np.array([[0, 0, -1, -1, -1, 0, 0]], dtype=np.int32)
-    known = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
+    known = free_space(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
     np.testing.assert_allclose(known, [0.7, 0.7, UNKNOWN, UNKNOWN, UNKNOWN, 0.8, 0.8])
     labels[0, -2:] = 1
-    other = surroundings(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
+    other = free_space(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
     np.testing.assert_allclose(other[2:5], 0.8)
 
 
@@ -68,7 +68,7 @@ def test_a_narrow_gap_at_the_border_is_unknown(length: int, known: float) -> Non
 
 def test_what_was_not_measured_is_presumed() -> None:
     points = row((0.7, HIGH, 1), (NONE, HIGH, 2))
-    around = surroundings(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
+    around = free_space(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
     np.testing.assert_array_equal(around.presumed, [[False, True, True]])
 
 
@@ -82,7 +82,7 @@ def test_an_object_touches_the_border_or_a_narrow_gap_beside_it(column: int, tou
     free_depth[:, 11] = UNKNOWN  # a gap within an object
     mask = np.zeros(free_depth.shape, dtype=np.bool_)
     mask[4, column] = True
-    assert touches_unseen(mask, free_depth) == touches
+    assert is_truncated(mask, free_depth) == touches
 
 
 @pytest.mark.parametrize("hidden", [0.2, 0.35, 0.5])
@@ -97,10 +97,10 @@ def test_what_an_occluder_hides_is_left_open_and_does_not_bend_the_fit(hidden: f
     depth[:, edge:] = np.nan
     free_depth = np.full(depth.shape, EMPTY, dtype=np.float32)
     free_depth[:, edge:] = 0.3  # metres to the occluder
-    around = Surroundings(free_depth, np.zeros(depth.shape, dtype=np.bool_))
+    around = FreeSpace(free_depth, np.zeros(depth.shape, dtype=np.bool_))
     points = depth_to_cloud(depth, camera)
     start = truth + [0.01, 0.01, 0.03, -0.1, 0.1, 0.05]
-    known = refine(model, Observation(points, camera, surroundings=around), start, settings)
+    known = refine(model, Observation(points, camera, free_space=around), start, settings)
     blind = refine(model, Observation(points, camera), start, settings)
 
     assert np.abs(known.values - truth)[[2, 5]].max() < 2e-3  # yaw and height are in view

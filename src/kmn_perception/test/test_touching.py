@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kmn_perception.configuration.resources import share_directory
 from kmn_perception.estimator import Status
-from kmn_perception.frames.experiment import load_pipeline
-from kmn_perception.frames.labelled_frame import read_frames
-from kmn_perception.frames.reference import measure
-from kmn_perception.frames.settings import FramesSettings
-from kmn_perception.frames.upright_box import UprightBox, box_of_cube, intersection_over_union
-from kmn_perception.rendering import depth_to_points, render
-from kmn_perception.resources import share_directory
+from kmn_perception.experiments.experiment import load_pipeline
+from kmn_perception.experiments.labelled_frame import read_frames
+from kmn_perception.experiments.reference import measure
+from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.experiments.upright_box import UprightBox, box_of_cube, intersection_over_union
+from kmn_perception.model.rendering import depth_to_points, render
 
-SETTINGS = FramesSettings.load()
+SETTINGS = ExperimentSettings.load()
 LABEL = 20  # the carton that is half hidden
 SIZE = np.array([0.2, 0.05, 0.3])  # of the box that stands before it
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.tracking import ObjectTracker
+from kmn_perception.scene.tracking import ObjectTracker
 
 DISTANCE = 0.05
 MEMORY = 30  # frames

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from safetensors.torch import load_file
 
-from kmn_perception import weights
-from kmn_perception.configuration import ConfigurationError
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network import weights
 from kmn_perception.training.samples import sample
 from kmn_perception.training.settings import TrainingSettings
 from kmn_perception.training.train import arguments, settings_of
@@ -119,7 +119,7 @@ def test_the_command_line_replaces_the_settings() -> None:
     ],
 )
 def test_wrong_settings_are_refused(tmp_path: Path, line: str, message: str) -> None:
-    from kmn_perception import resources
+    from kmn_perception.configuration import resources
 
     key = line.split(":")[0]
     kept = [

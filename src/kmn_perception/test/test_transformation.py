@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_perception.transformation import Transformation, transform_points
+from kmn_perception.model.transformation import Transformation, transform_points
 
 PLANAR = (("translation", "x"), ("translation", "y"), ("rotation", "z"))
 RIGID = Transformation(PLANAR)

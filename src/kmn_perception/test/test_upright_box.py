@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from kmn_perception.frames.upright_box import (
+from kmn_perception.experiments.upright_box import (
     UprightBox,
     box_of_cube,
     errors,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
 from kmn_perception.evaluation.visible_fraction import visible_fraction
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
 
 # At a distance of 1 m a pixel is 1 cm; the image reaches from -0.5 to 0.5 m, its border is
 # half a pixel beyond the outermost pixel centres.

@@ -8,10 +8,10 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from kmn_perception import weights
-from kmn_perception.cascade import Cascade, CascadeSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.paper_network import PaperNetwork
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network import weights
+from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.paper_network import PaperNetwork
 
 DOOR = KinematicModel.load("door")
 CHANNELS = [1, 1, 2, 2, 3]

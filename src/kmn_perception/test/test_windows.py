@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kmn_perception.camera import look_at
-from kmn_perception.cascade import CascadeSettings
-from kmn_perception.configuration import ConfigurationError
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.windows import Window, morph_of_body, render_window
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.camera import look_at
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.network.cascade import CascadeSettings
+from kmn_perception.network.windows import Window, morph_of_body, render_window
 
 SETTINGS = CascadeSettings.load().window
 MODELS = {name: KinematicModel.load(name) for name in ("box_b", "box_c", "box", "door")}

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_sim.scenario import Scenario
-from kmn_sim.simulation import Simulation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.simulation import Simulation
 
 MakeSimulation = Callable[..., Simulation]
 

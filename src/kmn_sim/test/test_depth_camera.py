@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.rendering import render
-from kmn_sim.clipping import nearest_depth
-from kmn_sim.depth_camera import DepthCamera
-from kmn_sim.renderer import RENDERERS
-from kmn_sim.scenario import Scenario
-from kmn_sim.simulation import Simulation
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import render
+from kmn_sim.sensors.clipping import nearest_depth
+from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.sensors.renderer import RENDERERS
+from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.simulation import Simulation
 
 Simulate = Callable[..., Simulation]
 MODELS: dict[str, Any] = {"door": {"frame": True}, "box_c": {"table": True}, "box_a": {}}

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from kmn_perception.rendering import render
-from kmn_sim.door import HANDLE_LINK, PANEL_LINK
-from kmn_sim.simulation import Simulation
+from kmn_perception.model.rendering import render
+from kmn_sim.world.door import HANDLE_LINK, PANEL_LINK
+from kmn_sim.world.simulation import Simulation
 
 DIRECTIONS = {"pull": -1.0, "push": 1.0}
 TURNED = -0.7

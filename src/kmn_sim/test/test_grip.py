@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_sim.pr2_settings import PR2Settings
-from kmn_sim.simulation import Simulation
-from kmn_sim.trajectory import Command, Waypoint
+from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.world.simulation import Simulation
 
 Simulate = Callable[..., Simulation]
 HALF_SIZE = (0.06, 0.02, 0.025)  # metres; of a lever
@@ -19,7 +19,7 @@ TIPS = ("l_gripper_l_finger_tip_joint", "l_gripper_r_finger_tip_joint")
 
 
 def move_gripper(simulation: Simulation, angle: float) -> None:
-    command = Command((PR2Settings.load().leader,), [Waypoint(0.5, (angle,))])
+    command = Command((RobotSettings.load().leader,), [Waypoint(0.5, (angle,))])
     simulation.controller.accept(command, simulation.time)
 
 

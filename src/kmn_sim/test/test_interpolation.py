@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_sim.interpolation import State, interpolate
+from kmn_sim.control.interpolation import State, interpolate
 
 value = st.floats(-5.0, 5.0)
 states = st.lists(value, min_size=6, max_size=6)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_sim.check_noise import compare
-from kmn_sim.kinect import Kinect, KinectSettings
-from kmn_sim.noise_statistics import inverse_step, missing_runs, plane_noise
+from kmn_perception.model.camera import Camera
+from kmn_sim.checks.check_noise import compare
+from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
+from kmn_sim.sensors.kinect import Kinect, KinectSettings
 
 FX = Camera.load("kinect_v1").fx
 

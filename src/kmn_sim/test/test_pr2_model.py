@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kmn_sim import pr2_model
-from kmn_sim.pr2_export import link_name
-from kmn_sim.pr2_settings import PR2Settings
-from kmn_sim.simulation import Simulation
+from kmn_sim.robot import pr2_model
+from kmn_sim.robot.pr2_export import link_name
+from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.world.simulation import Simulation
 
 robotic = pytest.importorskip("robotic")
 Simulate = Callable[..., Simulation]
@@ -20,7 +20,7 @@ Simulate = Callable[..., Simulation]
 
 def test_forward_kinematics_is_that_of_the_source(simulate: Simulate) -> None:
     simulation = simulate()
-    robot, settings = simulation.robot, PR2Settings.load()
+    robot, settings = simulation.robot, RobotSettings.load()
     source = robotic.Config()
     source.addFile(robotic.raiPath(settings.source))
     generator = np.random.default_rng(0)
@@ -48,7 +48,7 @@ def test_forward_kinematics_is_that_of_the_source(simulate: Simulate) -> None:
 def test_limits_are_those_of_the_source(simulate: Simulate) -> None:
     limits = simulate().robot.limits
     source = robotic.Config()
-    source.addFile(robotic.raiPath(PR2Settings.load().source))
+    source.addFile(robotic.raiPath(RobotSettings.load().source))
     for name, (low, high) in limits.items():
         expected = source.getFrame(name, False)
         attributes = expected.getAttributes() if expected else {}
@@ -58,7 +58,7 @@ def test_limits_are_those_of_the_source(simulate: Simulate) -> None:
 
 def test_efforts_and_masses_reach_the_engine(simulate: Simulate) -> None:
     simulation = simulate()
-    robot, settings = simulation.robot, PR2Settings.load()
+    robot, settings = simulation.robot, RobotSettings.load()
     for name, motor in settings.joints.items():
         info = simulation.physics.getJointInfo(robot.body, robot.link(name))
         assert info[10:12] == (motor.effort, motor.velocity)

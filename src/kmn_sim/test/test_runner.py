@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_sim.runner import Runner
-from kmn_sim.scenario import Scenario
-from kmn_sim.simulation import Simulation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.world.runner import Runner
+from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.simulation import Simulation
 
 
 def make() -> Simulation:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_sim.depth_camera import DepthCamera
-from kmn_sim.pr2_settings import PR2Settings
-from kmn_sim.scenario import Scenario, ScenarioError
-from kmn_sim.simulation import Simulation
-from kmn_sim.trajectory import Command, Waypoint
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.world.scenario import Scenario, ScenarioError
+from kmn_sim.world.simulation import Simulation
 
 Simulate = Callable[..., Simulation]
-ARM = PR2Settings.load().names[3:10]
+ARM = RobotSettings.load().names[3:10]
 REACH = (0.4, 0.2, 0.8, -1.2, 0.5, -0.9, 1.2)
 
 
@@ -50,7 +50,7 @@ def test_gravity_is_compensated_in_any_posture(simulate: Simulate) -> None:
 
 def test_efforts_stay_within_those_of_the_pr2(simulate: Simulate) -> None:
     simulation = simulate()
-    efforts = np.array([motor.effort for motor in PR2Settings.load().joints.values()])
+    efforts = np.array([motor.effort for motor in RobotSettings.load().joints.values()])
     reach(simulation, seconds=0.1)  # far faster than it can
     for _ in range(120):
         simulation.step()
@@ -72,7 +72,7 @@ def test_a_blocked_arm_does_not_go_through_what_blocks_it(simulate: Simulate) ->
 
 def test_fingers_close_together(simulate: Simulate) -> None:
     simulation = simulate()
-    settings = PR2Settings.load()
+    settings = RobotSettings.load()
     for target in (0.5, 0.05):
         command = Command((settings.leader,), [Waypoint(1.0, (target,))])
         simulation.controller.accept(command, simulation.time)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kmn_sim.interpolation import State
-from kmn_sim.trajectory import Command, TrajectoryError, Waypoint
-from kmn_sim.trajectory_controller import TrajectoryController
+from kmn_sim.control.interpolation import State
+from kmn_sim.control.trajectory import Command, TrajectoryError, Waypoint
+from kmn_sim.control.trajectory_controller import TrajectoryController
 
 LIMITS = {"a": (-1.0, 1.0), "b": (-2.0, 2.0)}
 NAMES = ("a", "b")

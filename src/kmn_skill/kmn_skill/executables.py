@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from kmn_perception.executable import executable as _executable
+from kmn_perception.command_line.launcher import executable as _executable
 
 PLANNER = "robotic"
 
-skill_node = _executable("kmn_skill.start_skill_node", PLANNER)
-evaluate = _executable("kmn_skill.evaluate", PLANNER)
-demo = _executable("kmn_skill.demo", PLANNER)
+skill_node = _executable("kmn_skill.ros.start_skill_node", PLANNER)
+evaluate = _executable("kmn_skill.experiments.evaluate", PLANNER)
+demo = _executable("kmn_skill.experiments.demo", PLANNER)

@@ -18,8 +18,8 @@ from launch.substitutions import Command, LaunchConfiguration
 from launch_ros.actions import Node, SetParameter
 from launch_ros.parameter_descriptions import ParameterValue
 
-from kmn_perception.camera import Camera
-from kmn_perception.rotation import quaternion_from_matrix
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rotation import quaternion_from_matrix
 
 ARGUMENTS = {
     "seed": ("0", "seed of the random door and of the noise"),

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from kmn_skill.door_memory import DoorMemory
+from kmn_skill.execution.door_memory import DoorMemory
 
 DOOR: NDArray[np.float64] = np.arange(7, dtype=np.float64)
 metres = st.floats(-5.0, 5.0)

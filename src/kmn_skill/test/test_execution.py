@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_skill.errors import ExecutionError
-from kmn_skill.execution import GRIPPER, Execution, ExecutionSettings, Part, sample
-from kmn_skill.plan import Phase, Plan, PlanReport
-from kmn_skill.states import WorldState
+from kmn_skill.execution.errors import ExecutionError
+from kmn_skill.execution.plan_execution import GRIPPER, Execution, ExecutionSettings, Part, sample
+from kmn_skill.execution.states import WorldState
+from kmn_skill.planning.plan import Phase, Plan, PlanReport
 
 SETTINGS = ExecutionSettings(
     start_delay=0.3,

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill.door_motion import moved_cubes
-from kmn_skill.errors import DoorError
-from kmn_skill.perceived_door import (
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.errors import DoorError
+from kmn_skill.execution.perceived_door import (
     DoorSettings,
     Observation,
     PerceivedDoor,
@@ -20,6 +19,7 @@ from kmn_skill.perceived_door import (
     grasp_quantities,
     when_closed,
 )
+from kmn_skill.planning.kinematics import moved_cubes
 
 MODEL = KinematicModel.load("door")
 NAMES = tuple(parameter.name for parameter in MODEL.parameters)

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill.check import PlanRejected, check
-from kmn_skill.make_prototypes import HOME
-from kmn_skill.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
-from kmn_skill.planner import Planner
-from kmn_skill.settings import SkillSettings
-from kmn_skill.timing import peaks
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.experiments.make_prototypes import HOME
+from kmn_skill.planning.check import PlanRejected, check
+from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
+from kmn_skill.planning.planner import Planner
+from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.timing import peaks
 
 Break = Callable[[Plan], Plan]
 SETTINGS = SkillSettings.load()

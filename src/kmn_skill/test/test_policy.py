@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import robotic as ry
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill import prototypes
-from kmn_skill.make_prototypes import HOME
-from kmn_skill.plan import PlanRequest
-from kmn_skill.policy import Policy, near_pairs, pairs
-from kmn_skill.robot import Robot
-from kmn_skill.settings import SkillSettings
-from kmn_skill.transfer import hermite, move_base, refine, transfer
-from kmn_skill.world import World
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.experiments.make_prototypes import HOME
+from kmn_skill.planning import prototypes
+from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.policy import Policy, near_pairs, pairs
+from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.transfer import hermite, move_base, refine, transfer
+from kmn_skill.planning.world import World
 
 MODEL, ROBOT, SETTINGS = KinematicModel.load("door"), Robot.load(), SkillSettings.load()
 THETA = np.array([0.4, -0.6, 0.8])

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kmn_skill.check import check
-from kmn_skill.make_prototypes import HOME
-from kmn_skill.plan import Plan, PlanRequest
-from kmn_skill.planner import Planner
-from kmn_skill.settings import SkillSettings
+from kmn_skill.experiments.make_prototypes import HOME
+from kmn_skill.planning.check import check
+from kmn_skill.planning.plan import Plan, PlanRequest
+from kmn_skill.planning.planner import Planner
+from kmn_skill.planning.settings import SkillSettings
 
 POLICY = SkillSettings.load().policy
 FIRST = PlanRequest(np.zeros(3), np.zeros(4), np.array(HOME), np.zeros(2), -0.7, -0.9)

@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from kmn_skill.errors import StatesError
-from kmn_skill.states import Sample, StateSettings, StateWatch
+from kmn_skill.execution.errors import StatesError
+from kmn_skill.execution.states import Sample, StateSettings, StateWatch
 
 SETTINGS = StateSettings(state_timeout=1.0, max_speed=4.0, max_jump=0.1)
 NAMES = ("base_x", "arm")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import robotic as ry
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_skill.clearance import Box, Surface, box_distance, clearance, sample_surface
-from kmn_skill.door_motion import moved_cubes
-from kmn_skill.robot import Robot
-from kmn_skill.settings import SkillSettings
-from kmn_skill.world import PADS, TOOL, World, boxes, door_body, surfaces
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.planning.clearance import Box, Surface, box_distance, clearance, sample_surface
+from kmn_skill.planning.kinematics import moved_cubes
+from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.world import PADS, TOOL, World, boxes, door_body, surfaces
 
 VALUES = np.array([0.3, -0.5, 0.7, -0.2, 0.15, 0.02, -0.06])
 

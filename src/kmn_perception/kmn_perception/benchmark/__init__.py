@@ -17,12 +17,12 @@ from rclpy.utilities import remove_ros_args
 
 from kmn_perception.benchmark import stages, transport
 from kmn_perception.benchmark.scene import full_cloud
-from kmn_perception.columns import columns
-from kmn_perception.command_line import output_file, whole_number, write_json
+from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.columns import columns
 from kmn_perception.estimator import MorphEstimator
-from kmn_perception.node_parameters import DESCRIPTORS, NodeSettings
 from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.ros_parameters import declare_parameters
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.ros.parameters import declare_parameters
 
 THREADS = 1  # of torch; as morph_node sets it
 

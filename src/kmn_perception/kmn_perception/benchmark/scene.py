@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.messages import cloud_from_points
-from kmn_perception.rendering import depth_to_points, render
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.ros.messages import cloud_from_points
 
 WALL_DISTANCE = 1.0  # metres behind the object
 EXTENT = 20.0  # metres; floor and wall fill the view

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
-from kmn_perception.messages import (
+from kmn_perception.network.morph import predict
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.refinement import refine
+from kmn_perception.ros.messages import (
     markers_from_estimates,
     parameters_from_estimate,
     points_from_cloud,
 )
-from kmn_perception.morph import predict
-from kmn_perception.node_parameters import NodeSettings
-from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.refinement import refine
+from kmn_perception.ros.morph_node_parameters import NodeSettings
 
 STEPS = 5  # predictions, as in the paper, or as many as the network makes
 Stage = Callable[[], object]

@@ -16,8 +16,8 @@ from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
 from kmn_perception.benchmark.scene import full_cloud
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.node_parameters import NodeSettings
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.morph_node_parameters import NodeSettings
 
 TOPIC = "benchmark/points"  # not `points`: nodes that run beside are left alone
 PERIOD = 0.1  # seconds

@@ -18,11 +18,11 @@ from kmn_perception.evaluation.methods import METHODS, PEERS, Estimate, Method, 
 from kmn_perception.evaluation.networks import Networks, load_networks
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.network.weights import Weights
 from kmn_perception.training.samples import EVALUATION, sample
 from kmn_perception.training.settings import SensorSettings
-from kmn_perception.weights import Weights
 
 LIMIT = "information_limit"
 NAMES = (*METHODS, LIMIT)

@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
 
-LEAST_DEVIATION = 1e-9  # of half a parameter's range; what is known better counts as known so well
+MIN_DEVIATION = 1e-9  # of half a parameter's range; what is known better counts as known so well
 
 
 def is_covered(
@@ -37,7 +37,7 @@ def is_covered(
     if not (np.isfinite(off).all() and np.isfinite(scaled).all()):
         return False
     variances, axes = np.linalg.eigh(scaled)
-    distance = ((axes.T @ off) ** 2 / np.maximum(variances, LEAST_DEVIATION**2)).sum()
+    distance = ((axes.T @ off) ** 2 / np.maximum(variances, MIN_DEVIATION**2)).sum()
     return bool(distance <= chi2_quantile(confidence, len(off)))
 
 

@@ -8,10 +8,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predictions
-from kmn_perception.network import MorphNetwork
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.network.morph import predictions
+from kmn_perception.network.morph_network import MorphNetwork
 
 
 def absolute_errors(

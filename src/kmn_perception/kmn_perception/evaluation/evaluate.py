@@ -12,9 +12,9 @@ from typing import Any
 
 from tqdm import tqdm
 
-from kmn_perception import resources
-from kmn_perception.command_line import output_file, whole_number, write_json
-from kmn_perception.configuration import ConfigurationError
+from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.comparison import NAMES, Comparison, Request
 from kmn_perception.evaluation.hashes import short_hash
 from kmn_perception.evaluation.methods import MethodError
@@ -22,8 +22,8 @@ from kmn_perception.evaluation.processes import measurements
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.table import report
 from kmn_perception.evaluation.tally import Tally
-from kmn_perception.sensor import NOISES
-from kmn_perception.weights import WeightsError
+from kmn_perception.model.sensor_noise import NOISES
+from kmn_perception.network.weights import WeightsError
 
 
 def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:

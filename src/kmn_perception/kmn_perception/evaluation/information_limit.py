@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
 from kmn_perception.evaluation.observability import null_directions
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.rendering import render
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.rendering import render
 
 SAME_DEPTH = 1e-5  # metres; above the rounding of single precision
 PRECISION = 1e-3  # of the interval that the limits leave along a direction

@@ -20,12 +20,12 @@ from kmn_perception.evaluation.registration import (
     point_to_point,
 )
 from kmn_perception.evaluation.settings import EvaluationSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.network import MorphNetwork
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.weights import Weights, WeightsError
 from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.weights import Weights, WeightsError
 
 
 class MethodError(ValueError):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from kmn_perception import resources, weights
+from kmn_perception.configuration import resources
 from kmn_perception.evaluation.hashes import short_hash
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.weights import Weights, WeightsError
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network import weights
+from kmn_perception.network.weights import Weights, WeightsError
 
 
 class Networks(NamedTuple):

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
 
 EMPTY = -1
 DEPTH = 3

@@ -140,7 +140,7 @@ def _scene(model: str, result: dict[str, Any], paper: PaperFigures) -> list[str]
         parts += [
             f"![Best and worst samples, before and after morphing]({samples_figure(model)})",
             "What the canonical camera sees of the points, above as observed, with the prototype's "
-            "outline, and below morphed by the estimate, with the outline at the estimated gamma.",
+            "contour, and below morphed by the estimate, with the contour at the estimated gamma.",
         ]
     return parts
 

@@ -12,7 +12,7 @@ import torch
 from kmn_perception.evaluation.comparison import Comparison, Measurement, Request
 from kmn_perception.evaluation.settings import EvaluationSettings
 
-LEAST_SAMPLES = 50  # of a process; for fewer its start, some seconds, does not pay
+MIN_SAMPLES = 50  # of a process; for fewer its start, some seconds, does not pay
 
 Measured = tuple[float, dict[str, Measurement]]
 
@@ -23,7 +23,7 @@ def measurements(
     comparison: Comparison, request: Request, settings: EvaluationSettings, samples: int, jobs: int
 ) -> Iterator[Measured]:
     """Yield what ``comparison`` measures on samples 0, 1, 2, ..., in this order."""
-    count = min(jobs, math.ceil(samples / LEAST_SAMPLES))
+    count = min(jobs, math.ceil(samples / MIN_SAMPLES))
     if count == 1:
         torch.set_num_threads(1)
         yield from map(comparison, range(samples))

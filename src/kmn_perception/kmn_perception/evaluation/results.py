@@ -13,13 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from kmn_perception.command_line import whole_number, write_json
-from kmn_perception.configuration import ConfigurationError
+from kmn_perception.command_line.arguments import whole_number, write_json
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.comparison import LIMIT, Comparison, Request
 from kmn_perception.evaluation.evaluate import command, configuration_hash, evaluate
-from kmn_perception.evaluation.figures.predictions import draw_predictions
-from kmn_perception.evaluation.figures.samples import Shown, draw_samples
-from kmn_perception.evaluation.figures.training import draw_training
 from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.evaluation.networks import load_networks
 from kmn_perception.evaluation.page import (
@@ -29,10 +26,13 @@ from kmn_perception.evaluation.page import (
     samples_figure,
     shown_method,
 )
+from kmn_perception.evaluation.plots.predictions import draw_predictions
+from kmn_perception.evaluation.plots.samples import Shown, draw_samples
+from kmn_perception.evaluation.plots.training import draw_training
 from kmn_perception.evaluation.settings import EvaluationSettings
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.sensor import NOISES
-from kmn_perception.weights import Weights, WeightsError
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.sensor_noise import NOISES
+from kmn_perception.network.weights import Weights, WeightsError
 
 MODELS = ("box_a", "box_b", "box_c", "door", "box")
 WITH_NOISE = ("kmn_paper", "kmn", "kmn_refined", LIMIT)

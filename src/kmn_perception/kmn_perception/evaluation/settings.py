@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from kmn_perception import resources
-from kmn_perception.configuration import Section
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import Section
 
 PaperFigures = Mapping[str, Mapping[str, float]]  # [method]["mean" or parameter]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kmn_perception.columns import columns
+from kmn_perception.command_line.columns import columns
 from kmn_perception.evaluation.settings import PaperFigures
 
 NONE = "-"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.evaluation.comparison import Measurement
 from kmn_perception.evaluation.settings import EvaluationSettings
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
 
 
 class Tally:

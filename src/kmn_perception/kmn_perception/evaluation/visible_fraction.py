@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
-from kmn_perception.rendering import render
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.rendering import render
 
 CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, 8)
 REACH = 4.0  # images; the view is unlimited but for what lies farther beside the sensor's image

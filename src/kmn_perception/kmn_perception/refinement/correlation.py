@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True, error_model="numpy")
-def alike(sums: NDArray[np.float64], lags: int) -> float:
+def correlated_count(sums: NDArray[np.float64], lags: int) -> float:
     """Return the variance of the sum of the residuals of all rows, as those of each row show it.
 
     Parameters

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kmn_perception.refinement.gauss_newton import Fit, fine_edges
 from kmn_perception.refinement.problem import Problem
 
-LEAST_INFORMATION = 1e-12
-LEAST_COMPONENT = 1e-3  # of a direction, in half ranges; less does not run into a limit
+MIN_INFORMATION = 1e-12
+MIN_COMPONENT = 1e-3  # of a direction, in half ranges; less does not run into a limit
 DOUBLINGS, BISECTIONS = 4, 7  # in the search for a segment's ends
 POINTS = 12  # of a segment
 PASSES = 3  # through several open directions
@@ -36,7 +36,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     half = problem.half_range
     information = (fit.depth_information + fit.edge_information) * np.outer(half, half)
     eigenvalues, directions = np.linalg.eigh(information)
-    variances = 1.0 / np.maximum(eigenvalues, LEAST_INFORMATION)
+    variances = 1.0 / np.maximum(eigenvalues, MIN_INFORMATION)
     is_open = variances > problem.settings.weak**2
     directions[:, is_open] = _disentangled(directions[:, is_open])
     for i, j in combinations(np.flatnonzero(is_open), 2):
@@ -170,6 +170,6 @@ def _within_limits(
 ) -> tuple[float, float]:
     """Return the least and greatest multiple of a direction that keeps the limits."""
     half = problem.half_range
-    moved = np.abs(direction) > LEAST_COMPONENT * half
+    moved = np.abs(direction) > MIN_COMPONENT * half
     ways = (problem.limits[moved] - values[moved, None]) / direction[moved, None]
     return min(0.0, ways.min(axis=1).max()), max(0.0, ways.max(axis=1).min())

@@ -15,12 +15,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.correlation import alike
+from kmn_perception.refinement.correlation import correlated_count
 from kmn_perception.refinement.image import Image
 from kmn_perception.refinement.silhouette import EdgeSettings, half_chord, scan, split
 from kmn_perception.refinement.view import PLANES, View, add_normal_equations
 
-LARGEST_WINDOW = 64  # pixels to either side of an edge
+MAX_WINDOW = 64  # pixels to either side of an edge
 ROOT_HALF = math.sqrt(0.5)
 ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 FAR = 6.0  # standard deviations inside its own side, where a pixel says nothing more
@@ -118,7 +118,7 @@ def _add_edge(
     solids, lines, all_ends, faces = view.solids, view.lines[b], view.ends[b], view.faces[b]
     inverse_depth, presumed, upwards = image.inverse_depth, image.presumed, image.upwards
     lowest = image.floor + settings.floor_margin
-    evidence = np.empty(4 * LARGEST_WINDOW)
+    evidence = np.empty(4 * MAX_WINDOW)
     line, ends = lines[edge], all_ends[edge]
     plane = solids[b, PLANES + 3 * faces[edge] : PLANES + 3 * faces[edge] + 3]
     rows = abs(line[0]) >= abs(line[1])
@@ -189,7 +189,7 @@ def _independent(shifts: NDArray[np.float64]) -> float:
     The edges of real objects are not quite straight, and a sensor may shift all of one alike.
     """
     alone = (shifts**2).sum()
-    return alone / alike(shifts, LAGS) if alone > 0.0 else 1.0
+    return alone / correlated_count(shifts, LAGS) if alone > 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.capture import capture
 from kmn_perception.refinement.edges import EdgeTerms, edge_terms
 from kmn_perception.refinement.planes import PlaneTerms, plane_terms
 from kmn_perception.refinement.problem import Problem
+from kmn_perception.refinement.reacquisition import reacquire
 from kmn_perception.refinement.settings import SearchSettings
 from kmn_perception.refinement.view import View
 
@@ -43,8 +43,8 @@ def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     search = problem.settings.search
     for level in search:
         values = _search(problem, values, level)
-    caught = capture(
-        problem.shape, problem.image, problem.limits, values, *problem.settings.capture
+    caught = reacquire(
+        problem.shape, problem.image, problem.limits, values, *problem.settings.reacquire
     )
     steps = sum(level.steps for level in search)
     if caught is not values:
@@ -79,7 +79,7 @@ def _search(
 def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fit:
     """Fit to the noise of the sensor, which is estimated as well."""
     settings = problem.settings.fine
-    least = Noise(settings.least_depth_noise * problem.steepness, settings.least_noise)
+    least = Noise(settings.min_depth_noise * problem.steepness, settings.min_noise)
     depth = problem.settings.search[-1].depth / COARSE * problem.steepness
     noise = Noise(depth, settings.noise)
     for pixels in (problem.settings.depth_pixels, settings.depth_pixels):
@@ -118,7 +118,7 @@ def _estimate_noise(
 def fine_edges(problem: Problem, view: View, noise: Noise, border: float) -> EdgeTerms:
     """Return the likelihood of the pixels beside the edges, but ``border`` s from their ends."""
     fine = problem.settings.fine
-    window = max(fine.least_window, fine.window * noise.lateral)
+    window = max(fine.min_window, fine.window * noise.lateral)
     return edge_terms(
         view,
         problem.image,

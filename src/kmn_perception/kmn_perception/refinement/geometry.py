@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.transformation import AXES, KINDS
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.transformation import AXES, KINDS
 
 TRANSLATION, ROTATION, SCALE = (KINDS.index(kind) for kind in ("translation", "rotation", "scale"))
 

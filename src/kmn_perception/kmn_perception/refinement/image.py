@@ -8,13 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.observation import Observation, empty_surroundings
+from kmn_perception.model.observation import Observation, all_free
 from kmn_perception.refinement.view import projection
 
 HALF = 0.5
 THICKNESS = 0.004  # metres; other objects are at least as thick
 PRESUMED = 0.01  # metres by which presumed depths may be wrong
-LEAST_RANGE = 1e-6  # metres
+MIN_RANGE = 1e-6  # metres
 
 
 class Image(NamedTuple):
@@ -55,9 +55,9 @@ def image_of(observation: Observation) -> Image:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
-    around = observation.surroundings
+    around = observation.free_space
     if around is None:
-        around = empty_surroundings(camera.height, camera.width)
+        around = all_free(camera.height, camera.width)
     with np.errstate(divide="ignore"):
         inverse_depth = np.float32(-1.0) / around.free_depth
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
@@ -70,7 +70,7 @@ def image_of(observation: Observation) -> Image:
         matrix,
         upwards,
         float(observation.floor),
-        1.0 / max(camera.near, LEAST_RANGE),
+        1.0 / max(camera.near, MIN_RANGE),
         1.0 / camera.far,
     )
 

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.image import Image, may_hide
-from kmn_perception.refinement.view import View, meet_any
+from kmn_perception.refinement.view import View, raycast_any
 
 MOST = 15  # times as many pixels as asked for are looked at in all
 DIGITS = 6  # of the share; less is the rounding of the points
@@ -68,7 +68,7 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
 @njit(cache=True, error_model="numpy")
 def _predicted(solids: NDArray[np.float64], image: Image, u: float, v: float) -> float:
     """Return the inverse depth at which a pixel should show the model, 0 if it should not."""
-    predicted, _, _ = meet_any(solids, u, v)
+    predicted, _, _ = raycast_any(solids, u, v)
     if predicted < image.farthest or predicted > image.nearest:
         return 0.0
     up = image.upwards

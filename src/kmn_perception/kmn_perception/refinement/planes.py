@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.correlation import alike
+from kmn_perception.refinement.correlation import correlated_count
 from kmn_perception.refinement.image import Image
-from kmn_perception.refinement.view import PLANES, View, add_normal_equations, meet_any
+from kmn_perception.refinement.view import PLANES, View, add_normal_equations, raycast_any
 
 LAGS = 8  # rows that may be shifted alike
 
@@ -77,7 +77,7 @@ def plane_terms(
     count = 0
     for i in range(0, pixels.shape[0], stride):
         u, v = float(pixels[i, 0]), float(pixels[i, 1])
-        predicted, body, face = meet_any(solids, u, v)
+        predicted, body, face = raycast_any(solids, u, v)
         if body < 0 or predicted > image.nearest or predicted < image.farthest:
             continue
         if border > 0.0 and _at_rim(solids, rims, body, face, u, v, predicted):
@@ -109,8 +109,8 @@ def plane_terms(
             moment, force = moments[body, face], forces[body, face]
             moment[1, 0], moment[2, 0], moment[2, 1] = moment[0, 1], moment[0, 2], moment[1, 2]
             in_rows, in_columns = (
-                alike(row_sums[body, face], LAGS),
-                alike(column_sums[body, face], LAGS),
+                correlated_count(row_sums[body, face], LAGS),
+                correlated_count(column_sums[body, face], LAGS),
             )
             often = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
             slopes = view.plane_slopes[body, face]

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.geometry import Shape, cuboids, shape_of
 from kmn_perception.refinement.image import Image, image_of
 from kmn_perception.refinement.misfit import misfit
@@ -17,7 +17,7 @@ from kmn_perception.refinement.settings import RefinementSettings
 from kmn_perception.refinement.view import View, view_of
 
 SOME = 1000  # pixels that tell the object's distance
-LEAST_MOVEMENT = 1e-12  # pixels per unit
+MIN_MOVEMENT = 1e-12  # pixels per unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,4 +77,4 @@ class Problem:
         squares = slopes**2
         corners = 0.25 * squares[:, :, :3].sum(axis=(1, 2)) + squares[:, :, 3].sum(axis=1)
         focal_length = np.linalg.norm(self.image.projection[0, :3])
-        return np.sqrt(corners.max(axis=0) * self.steepness) * focal_length + LEAST_MOVEMENT
+        return np.sqrt(corners.max(axis=0) * self.steepness) * focal_length + MIN_MOVEMENT

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.covariance import with_covariance
 from kmn_perception.refinement.gauss_newton import Fit, fit
 from kmn_perception.refinement.problem import Problem

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from kmn_perception import resources
-from kmn_perception.configuration import Section
-from kmn_perception.refinement.edges import LARGEST_WINDOW
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import Section
+from kmn_perception.refinement.edges import MAX_WINDOW
 from kmn_perception.refinement.silhouette import EdgeSettings
 
 
@@ -34,7 +34,7 @@ class SearchSettings:
     samples: int
 
 
-class CaptureSettings(NamedTuple):
+class ReacquisitionSettings(NamedTuple):
     """The search for a lost body: size of the grid, and the support that is enough without it."""
 
     tries: int
@@ -51,11 +51,11 @@ class FineSettings:
         Largest number of steps with few, and again with many pixels.
     depth_pixels
         Number of observed pixels whose depth is compared in the last steps.
-    noise, least_noise
+    noise, min_noise
         Lateral noise at the start and at least, pixels.
-    window, least_window
+    window, min_window
         Pixels that count beside an edge, in units of the lateral noise, and at least.
-    least_depth_noise
+    min_depth_noise
         Metres.
     robust
         Depths beyond this lose their weight, in units of their noise.
@@ -69,10 +69,10 @@ class FineSettings:
     steps: int
     depth_pixels: int
     noise: float
-    least_noise: float
+    min_noise: float
     window: float
-    least_window: float
-    least_depth_noise: float
+    min_window: float
+    min_depth_noise: float
     robust: float
     border: float
     tolerance: float
@@ -109,7 +109,7 @@ class RefinementSettings:
         Fewer points are not refined.
     depth_pixels
         Number of observed pixels whose depth is compared in one step.
-    search, capture, fine, edges, misfit
+    search, reacquire, fine, edges, misfit
         Of the parts.
     starts
         From so many starts the model is fitted where there is no estimate.
@@ -128,7 +128,7 @@ class RefinementSettings:
     min_points: int
     depth_pixels: int
     search: tuple[SearchSettings, ...]
-    capture: CaptureSettings
+    reacquire: ReacquisitionSettings
     fine: FineSettings
     edges: EdgeSettings
     starts: int
@@ -146,7 +146,7 @@ class RefinementSettings:
         section = Section.load(file)
         section.allow(
             (
-                "min_points", "depth_pixels", "search", "capture", "fine", "edges", "starts",
+                "min_points", "depth_pixels", "search", "reacquire", "fine", "edges", "starts",
                 "damping", "limit_margin", "limit_softness", "misfit", "weak", "segment_rise",
             )
         )  # fmt: skip
@@ -154,7 +154,7 @@ class RefinementSettings:
             min_points=section.whole_number("min_points", 1, 10**6),
             depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
             search=tuple(_search(entry) for entry in section.sections("search")),
-            capture=_capture(section.section("capture")),
+            reacquire=_reacquisition(section.section("reacquire")),
             fine=_fine(section.section("fine")),
             edges=_edges(section.section("edges")),
             starts=section.whole_number("starts", 1, 100),
@@ -170,16 +170,16 @@ class RefinementSettings:
 def _search(section: Section) -> SearchSettings:
     section.allow(("window", "depth", "steps", "samples"))
     return SearchSettings(
-        section.number("window", 1.0, LARGEST_WINDOW),
+        section.number("window", 1.0, MAX_WINDOW),
         section.number("depth", 1e-6, 1e3),
         section.whole_number("steps", 0, 100),
         section.whole_number("samples", 1, 10**6),
     )
 
 
-def _capture(section: Section) -> CaptureSettings:
+def _reacquisition(section: Section) -> ReacquisitionSettings:
     section.allow(("tries", "enough"))
-    return CaptureSettings(
+    return ReacquisitionSettings(
         section.whole_number("tries", 1, 10**5), section.number("enough", -1.0, 1.0)
     )
 
@@ -187,18 +187,18 @@ def _capture(section: Section) -> CaptureSettings:
 def _fine(section: Section) -> FineSettings:
     section.allow(
         (
-            "steps", "depth_pixels", "noise", "least_noise", "window", "least_window",
-            "least_depth_noise", "robust", "border", "tolerance",
+            "steps", "depth_pixels", "noise", "min_noise", "window", "min_window",
+            "min_depth_noise", "robust", "border", "tolerance",
         )
     )  # fmt: skip
     return FineSettings(
         steps=section.whole_number("steps", 1, 1000),
         depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
-        noise=section.number("noise", 1e-6, LARGEST_WINDOW / 4),
-        least_noise=section.number("least_noise", 1e-6, 1.0),
+        noise=section.number("noise", 1e-6, MAX_WINDOW / 4),
+        min_noise=section.number("min_noise", 1e-6, 1.0),
         window=section.number("window", 1.0, 10.0),
-        least_window=section.number("least_window", 1.0, LARGEST_WINDOW),
-        least_depth_noise=section.number("least_depth_noise", 1e-9, 1.0),
+        min_window=section.number("min_window", 1.0, MAX_WINDOW),
+        min_depth_noise=section.number("min_depth_noise", 1e-9, 1.0),
         robust=section.number("robust", 1.0, 100.0),
         border=section.number("border", 0.0, 10.0),
         tolerance=section.number("tolerance", 0.0, 1.0),

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.image import may_hide
-from kmn_perception.refinement.view import meet
+from kmn_perception.refinement.view import raycast
 
 CERTAIN = 5.0  # standard deviations that tell two depths apart
 MOST = 100.0  # of a log-likelihood ratio
@@ -93,7 +93,7 @@ def scan(
     for k in range(count):
         p = start + step * k
         column, row = (p, a) if rows else (a, p)
-        expected, _ = meet(solids, b, float(column), float(row))
+        expected, _ = raycast(solids, b, float(column), float(row))
         if expected == 0.0:
             expected = at_edge
         seen = float(inverse_depth[row, column])
@@ -124,7 +124,7 @@ def _evidence(
     behind = 0.0
     for other in range(solids.shape[0]):
         if other != b:
-            met, _ = meet(solids, other, u, v)
+            met, _ = raycast(solids, other, u, v)
             if met > expected:
                 return 0.0
             behind = max(behind, met)

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera
+from kmn_perception.model.camera import Camera
 from kmn_perception.refinement.geometry import Shape, cuboids
 
-LEAST_DEPTH = 1e-3  # metres in front of the camera; edges are cut off there
+MIN_DEPTH = 1e-3  # metres in front of the camera; edges are cut off there
 PLANES, VISIBLE, SOLID = 4, 22, 28  # where the planes and flags of a solid begin, and its length
 
 
@@ -26,7 +26,7 @@ class View(NamedTuple):
     Face ``2 * axis`` is at -1/2 along the unit cube's axis, ``2 * axis + 1`` at +1/2.
     """
 
-    solids: NDArray[np.float64]  # (B, SOLID) for ``meet``: the bounds, then q of the faces, then
+    solids: NDArray[np.float64]  # (B, SOLID) for ``raycast``: the bounds, then q of the faces, then
     # 1 for each face that looks at the camera
     plane_slopes: NDArray[np.float64]  # (B, 6, 3, P)
     lines: NDArray[np.float64]  # (B, 12, 3) l: distance to the edge in pixels, positive inside
@@ -145,12 +145,12 @@ def _ends(
     """Fill in where the part of an edge before the camera ends in the image, if there is any."""
     low, high = -0.5, 0.5
     if direction[2] != 0.0:
-        cut = (LEAST_DEPTH - start[2]) / direction[2]
+        cut = (MIN_DEPTH - start[2]) / direction[2]
         if direction[2] > 0.0:
             low = max(low, cut)
         else:
             high = min(high, cut)
-    elif start[2] < LEAST_DEPTH:
+    elif start[2] < MIN_DEPTH:
         return False
     if low >= high:
         return False
@@ -169,7 +169,7 @@ def _bound(bounds: NDArray[np.float64], cube: NDArray[np.float64]) -> None:
         point = cube[:, 3].copy()
         for axis in range(3):
             point += ((corner >> axis) % 2 - 0.5) * cube[:, axis]
-        if point[2] < LEAST_DEPTH:
+        if point[2] < MIN_DEPTH:
             bounds[0], bounds[1], bounds[2], bounds[3] = -np.inf, np.inf, -np.inf, np.inf
             return
         u, v = point[0] / point[2], point[1] / point[2]
@@ -195,7 +195,7 @@ def add_normal_equations(
 
 
 @njit(cache=True, error_model="numpy")
-def meet(solids: NDArray[np.float64], b: int, u: float, v: float) -> tuple[float, int]:
+def raycast(solids: NDArray[np.float64], b: int, u: float, v: float) -> tuple[float, int]:
     """Return the inverse depth and the face at which the ray of a pixel enters a body; 0, -1: none.
 
     The ray is within the body from the last plane of a visible face to the first of the others.
@@ -221,11 +221,11 @@ def meet(solids: NDArray[np.float64], b: int, u: float, v: float) -> tuple[float
 
 
 @njit(cache=True, error_model="numpy")
-def meet_any(solids: NDArray[np.float64], u: float, v: float) -> tuple[float, int, int]:
+def raycast_any(solids: NDArray[np.float64], u: float, v: float) -> tuple[float, int, int]:
     """Return inverse depth, body and face where the ray of a pixel meets the model first."""
     nearest, body, face = 0.0, -1, -1
     for b in range(solids.shape[0]):
-        inverse_depth, entered = meet(solids, b, u, v)
+        inverse_depth, entered = raycast(solids, b, u, v)
         if inverse_depth > nearest:
             nearest, body, face = inverse_depth, b, entered
     return nearest, body, face

@@ -1,1 +1,4 @@
-"""The offline training tool: Algorithm 2 of the paper."""
+"""The offline training tool: Algorithm 2 of the paper, and the training of our network by stages.
+
+Imports ``network``, ``model`` and ``configuration``.
+"""

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import mse_loss
 
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predictions
-from kmn_perception.network import MorphNetwork
-from kmn_perception.paper_network import PaperNetwork
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network.morph import predictions
+from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.paper_network import PaperNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
 from kmn_perception.training.settings import TrainingSettings

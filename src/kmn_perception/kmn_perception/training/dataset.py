@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from kmn_perception.network import Inputs, InputType
+from kmn_perception.network.morph_network import Inputs, InputType
 
 
 class Dataset:

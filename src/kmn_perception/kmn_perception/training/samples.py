@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.camera import Camera, look_at
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.observation import Observation, Surroundings
-from kmn_perception.rendering import depth_to_cloud, render
-from kmn_perception.sensor import add_noise
-from kmn_perception.surroundings import EMPTY, UNKNOWN
+from kmn_perception.model.camera import Camera, look_at
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import FreeSpace, Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.model.sensor_noise import add_noise
+from kmn_perception.scene.free_space import EMPTY, UNKNOWN
 from kmn_perception.training.settings import SensorSettings
 
-LEAST_POINTS = 100  # a sample of which less is seen is drawn again
+MIN_POINTS = 100  # a sample of which less is seen is drawn again
 EVALUATION = (1,)  # spawn key that sets the evaluation's samples apart from all that train
 
 
@@ -49,7 +49,7 @@ def sample(
             observation = observe(model, values, model.camera, noise, generator)
         else:
             observation = _observe_from_around(model, values, sensor, generator)
-        if len(observation.points) >= LEAST_POINTS:
+        if len(observation.points) >= MIN_POINTS:
             return observation, values
 
 
@@ -89,7 +89,7 @@ def _observe_from_around(
         nearest = float(np.quantile(along, generator.uniform(0.0, 0.4)))
         _hide(free, depth, believed, direction, nearest)
         cloud = cloud[along >= nearest]
-    return Observation(cloud, believed, floor, Surroundings(free, np.zeros_like(free, np.bool_)))
+    return Observation(cloud, believed, floor, FreeSpace(free, np.zeros_like(free, np.bool_)))
 
 
 def _hide(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from kmn_perception import resources
-from kmn_perception.configuration import Section
-from kmn_perception.sensor import NOISES
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import Section
+from kmn_perception.model.sensor_noise import NOISES
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class SensorSettings:
         Ranges from which the sensor's place around the object is drawn: metres, and radians about
         the canonical camera's heading and above the ground.
     noise
-        One of ``kmn_perception.sensor.NOISES``.
+        One of ``kmn_perception.model.sensor_noise.NOISES``.
     holes
         Share of the samples with patches that were not measured.
     pose_error
@@ -128,7 +128,7 @@ class StagewiseSettings:
         Errors smaller than this, in units of the mean error to predict, count by their square.
     standardised
         Number of samples that give the images' mean and deviation.
-    least_deviation
+    min_deviation
         Added to the deviations, for pixels that hardly ever change.
     """
 
@@ -136,7 +136,7 @@ class StagewiseSettings:
     spread: float
     rounding: float
     standardised: int
-    least_deviation: float
+    min_deviation: float
 
     @classmethod
     def load(cls) -> StagewiseSettings:
@@ -149,7 +149,7 @@ class StagewiseSettings:
             spread=training.number("spread", 0.0, 10.0),
             rounding=training.number("rounding", 1e-6, 10.0),
             standardised=training.whole_number("standardised", 2, 10**6),
-            least_deviation=training.number("least_deviation", 1e-6, 1.0),
+            min_deviation=training.number("min_deviation", 1e-6, 1.0),
         )
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import smooth_l1_loss
 
-from kmn_perception.cascade import Cascade, CascadeSettings, Stage
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.morph import predictions
-from kmn_perception.network import MorphNetwork
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network.cascade import Cascade, CascadeSettings, Stage
+from kmn_perception.network.morph import predictions
+from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
 from kmn_perception.training.settings import StagewiseSettings, TrainingSettings
@@ -76,7 +76,7 @@ class StagewiseTraining(Training):
             (*images, _), values = self.data.batch(slice(self.stagewise.standardised * self.copies))
             stage = self.network.stage(step)
             codes = stage.encoding.encode(values)
-            stage.standardise(images, codes, self.stagewise.least_deviation)
+            stage.standardise(images, codes, self.stagewise.min_deviation)
 
     def _add(self, network: MorphNetwork, first: int, count: int) -> int:
         """Add ``count`` samples with all their copies; return the number of rows."""

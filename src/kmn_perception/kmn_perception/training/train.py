@@ -13,9 +13,9 @@ from typing import Any
 
 import torch
 
-from kmn_perception import weights
-from kmn_perception.configuration import ConfigurationError
-from kmn_perception.kinematic_model import KinematicModel
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network import weights
 from kmn_perception.training.algorithm2 import Algorithm2
 from kmn_perception.training.run import Run, RunError
 from kmn_perception.training.settings import TrainingSettings

@@ -17,9 +17,9 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from kmn_perception.evaluation.errors import errors_by_step
-from kmn_perception.kinematic_model import KinematicModel
-from kmn_perception.network import MorphNetwork
-from kmn_perception.observation import Observation
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
 from kmn_perception.training.samples import sample

@@ -1,1 +1,0 @@
-"""The experiment on real frames: references from labels, the estimates, and their errors."""

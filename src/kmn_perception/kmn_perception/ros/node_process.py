@@ -1,0 +1,115 @@
+"""Nodes that run in other processes, up to the end of a context, and a client of them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from kmn_perception.ros.parameters import request_to_set
+
+STOP_TIMEOUT = 10.0  # seconds for a node to end
+LOG_LINES = 5  # of a node's, shown if it ends
+POLL_PERIOD = 0.02  # seconds
+
+Found = TypeVar("Found")
+
+
+class ProcessError(RuntimeError):
+    """A node ended, or does not do what it is asked for; the text says why."""
+
+
+class NoAnswerError(ProcessError):
+    """A node runs, but did not answer in time."""
+
+
+class NodeProcess:
+    """Runs the module of a node with ROS arguments; it writes to ``log``."""
+
+    def __init__(self, module: str, arguments: Sequence[str], log: Path) -> None:
+        self._module, self._arguments, self._log = module, list(arguments), log
+
+    def __enter__(self) -> NodeProcess:
+        command = [sys.executable, "-m", self._module, "--ros-args", *self._arguments]
+        with self._log.open("wb") as output:
+            self._process = subprocess.Popen(command, stdout=output, stderr=output)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def check(self) -> None:
+        """Raise a `ProcessError` with the end of its output if the process has ended."""
+        if self._process.poll() is not None:
+            last = "\n".join(self._log.read_text(errors="replace").splitlines()[-LOG_LINES:])
+            raise ProcessError(
+                f"{self._module} ended with exit code {self._process.returncode}:\n{last}"
+            )
+
+
+class ProcessClient:
+    """Waits for what nodes in other processes do, as long as they run.
+
+    Parameters
+    ----------
+    node
+        Of this process, which is spun while the client waits.
+    processes
+        The others.
+    """
+
+    def __init__(self, node: Node, processes: Sequence[NodeProcess]) -> None:
+        self._processes = processes
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+
+    def wait(self, find: Callable[[], Found | None], timeout: float, whom: str) -> Found:
+        """Wait so many seconds until a function finds what ``whom`` shall do, and return it.
+
+        Raises
+        ------
+        NoAnswerError
+            If it finds nothing.
+        ProcessError
+            If a process ends.
+        """
+        deadline = time.monotonic() + timeout
+        while not (found := find()):
+            for process in self._processes:
+                process.check()
+            if time.monotonic() > deadline:
+                raise NoAnswerError(f"{whom} did not answer within {timeout:g} s")
+            self._executor.spin_once(timeout_sec=POLL_PERIOD)
+        return found
+
+    def set_parameters(self, service: Client, values: Mapping[str, Any], timeout: float) -> None:
+        """Set parameters of another node, all or none, by its service for that.
+
+        Raises
+        ------
+        ProcessError
+            If it refuses them, or as `wait` does.
+        """
+        future = service.call_async(request_to_set(values))
+        self.wait(future.done, timeout, service.srv_name)
+        result = future.result().result
+        if not result.successful:
+            raise ProcessError(f"{service.srv_name} refused {dict(values)}: {result.reason}")
+
+
+def parameter_arguments(values: Mapping[str, Any]) -> list[str]:
+    """Return the ROS arguments that set parameters of a node."""
+    return [text for name, value in values.items() for text in ("-p", f"{name}:={value}")]

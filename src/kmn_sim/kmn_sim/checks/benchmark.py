@@ -1,0 +1,128 @@
+"""Measure how fast the simulation runs, its renderers, and the way to morph_node's estimate."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rclpy.utilities import remove_ros_args
+
+from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.columns import columns
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.node_process import ProcessError
+from kmn_perception.ros.program import ros_session
+from kmn_sim.checks.check_perception import whole_scenes
+from kmn_sim.checks.scene_client import scene_client
+from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.sensors.renderer import RENDERERS
+from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.simulation import Simulation
+
+MODEL = "door"
+SIMULATED = 4.0  # seconds
+CAMERA_RATE = 10.0  # frames a second
+FRAMES = 20
+CONTACT = -0.83, -0.3  # base x and y (m) where the outstretched hand touches the door
+
+
+def arguments(argv: list[str]) -> argparse.Namespace:
+    """Parse the command line without its ROS arguments."""
+    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__)
+    parser.add_argument("--scenes", type=whole_number(1), default=20, help="default 20")
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    return parser.parse_args(argv)
+
+
+def real_time_factor(simulation: Simulation, camera: DepthCamera | None) -> float:
+    """Return the simulated seconds in one second, of a robot that touches the door."""
+    simulation.build(simulation.scenario)
+    touch(simulation)
+    frame_steps = round(1.0 / (CAMERA_RATE * simulation.step_time))
+    start = time.perf_counter()
+    for step in range(round(SIMULATED / simulation.step_time)):
+        simulation.step()
+        if camera is not None and step % frame_steps == 0:
+            camera.capture(simulation)
+    return SIMULATED / (time.perf_counter() - start)
+
+
+def touch(simulation: Simulation) -> None:
+    """Drive the robot with outstretched arm against the door."""
+    names = tuple(simulation.robot.limits)
+    position = simulation.robot.state().positions.copy()
+    position[3:10] = 0.0, 0.4, 0.0, -0.8, 0.0, -0.4, 0.0
+    arm = Waypoint(1.0, tuple(position))
+    position[:2] = CONTACT
+    there = Waypoint(4.0, tuple(position))
+    simulation.controller.accept(Command(names, [arm, there]), simulation.time)
+    simulation.run(4.0)
+    assert simulation.door is not None
+    bodies = simulation.robot.body, simulation.door.body
+    if not simulation.physics.getContactPoints(*bodies):
+        raise ProcessError("the robot does not touch the door")
+
+
+def milliseconds(work: Callable[[], object]) -> float:
+    """Return the median duration of some work that is done again and again."""
+    work()
+    durations = []
+    for _ in range(FRAMES):
+        start = time.perf_counter()
+        work()
+        durations.append(1e3 * (time.perf_counter() - start))
+    return float(np.median(durations))
+
+
+def benchmark(scenes: int) -> dict[str, Any]:
+    """Return all measurements, as written to JSON."""
+    model = KinematicModel.load(MODEL)
+    scenario = Scenario(model, np.zeros(len(model.parameters)))
+    camera = DepthCamera(model.camera, "world", "none", 0)
+    factors, depth_ms = {}, {}
+    for wanted in RENDERERS:
+        simulation = Simulation(scenario, renderer=wanted)
+        name = simulation.renderer.name
+        depth_ms[name] = milliseconds(lambda: camera.capture(simulation))  # noqa: B023
+        if wanted == RENDERERS[0]:
+            factors["physics"] = real_time_factor(simulation, None)
+            factors["with_camera"] = real_time_factor(simulation, camera)
+        simulation.close()
+    with scene_client(model, MODEL, "none", 0) as live:
+        latencies = [1e3 * live.show(values).latency for values in whole_scenes(model, 0, scenes)]
+    return {
+        "real_time_factor": factors,
+        "depth_ms": depth_ms,
+        "end_to_end_ms": {
+            "median": float(np.median(latencies)),
+            "p95": float(np.percentile(latencies, 95.0)),
+        },
+    }
+
+
+def report(result: dict[str, Any]) -> str:
+    """Return the table of a benchmark."""
+    rows = [["measurement", "value"]]
+    for name, values in result.items():
+        rows += [[f"{name} {key}", f"{value:.2f}"] for key, value in values.items()]
+    return columns(rows)
+
+
+def main() -> int:
+    """Run the executable ``benchmark``."""
+    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    with ros_session("benchmark"):
+        result = benchmark(options.scenes)
+    print(report(result))
+    if options.json:
+        write_json(options.json, result)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""Score morph_node on simulated scenes, live through the topics, against the ground truth."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.utilities import remove_ros_args
+
+from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.columns import columns
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.program import ros_session
+from kmn_sim.checks.scene_client import Answer, scene_client
+from kmn_sim.sensors.kinect import NOISES
+
+TOLERANCE = 0.01  # metres, radians and scales
+MARGIN = 2.0  # pixels of the image around what is wholly in view
+
+
+def arguments(argv: list[str]) -> argparse.Namespace:
+    """Parse the command line without its ROS arguments."""
+    parser = argparse.ArgumentParser(prog="check_perception", description=__doc__)
+    parser.add_argument("--model", default="door", help="shipped name or file (default door)")
+    parser.add_argument("--scenes", type=whole_number(1), default=20, help="default 20")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of scenes and noise")
+    parser.add_argument("--noise", choices=NOISES, default="none", help="default none")
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    return parser.parse_args(argv)
+
+
+def whole_scenes(model: KinematicModel, seed: int, count: int) -> Iterator[NDArray[np.float64]]:
+    """Draw morphing parameters (n + m,) of objects that are wholly in the camera's view."""
+    generator = np.random.default_rng(seed)
+    while count:
+        values = model.sample(generator, 1)[0]
+        if in_view(model.unit_cubes(*model.split(values)), model.camera):
+            count -= 1
+            yield values
+
+
+def in_view(unit_cubes: NDArray[np.float64], camera: Camera) -> bool:
+    """Tell whether all corners of cuboids (B, 4, 4) lie in the image."""
+    signs = np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3, [1.0]), axis=-1).reshape(8, 4)
+    corners = camera.world_to_camera @ unit_cubes @ signs.T
+    x, y, z, _ = np.moveaxis(corners, 1, 0)
+    u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+    inside = (u > MARGIN) & (u < camera.width - 1 - MARGIN)
+    inside &= (v > MARGIN) & (v < camera.height - 1 - MARGIN) & (z > camera.near)
+    return bool(inside.all())
+
+
+def errors(model: KinematicModel, answer: Answer) -> NDArray[np.float64]:
+    """Return the absolute errors (n + m,) of an answer, of an equivalent object where nearer."""
+    estimate = model.nearest_equivalent(answer.estimate, answer.truth)
+    return np.abs(estimate - answer.truth)
+
+
+def check(options: argparse.Namespace) -> dict[str, Any]:
+    """Show the scenes, print their errors as they come, and return all as written to JSON."""
+    model = KinematicModel.load(options.model)
+    names = [parameter.name for parameter in model.parameters]
+    scenes = []
+    with scene_client(model, options.model, options.noise, options.seed) as live:
+        print(columns([["scene", *names, "status", "ms"]]), flush=True)
+        for number, values in enumerate(whole_scenes(model, options.seed, options.scenes)):
+            answer = live.show(values)
+            error = errors(model, answer)
+            texts = [f"{number:5d}", *(f"{e:.4f}" for e in error)]
+            texts += [answer.reason or "OK", f"{1e3 * answer.latency:.0f}"]
+            print("  ".join(texts), flush=True)
+            scenes.append(
+                {
+                    "truth": answer.truth.tolist(),
+                    "estimate": [float(e) if np.isfinite(e) else None for e in answer.estimate],
+                    "error": [float(e) if np.isfinite(e) else None for e in error],
+                    "status": answer.status,
+                    "reason": answer.reason,
+                    "latency_ms": 1e3 * answer.latency,
+                    "within": bool(answer.status == 0 and (error <= TOLERANCE).all()),
+                }
+            )
+    return {
+        "model": model.name,
+        "parameters": names,
+        "seed": options.seed,
+        "noise": options.noise,
+        "tolerance": TOLERANCE,
+        "within": sum(scene["within"] for scene in scenes),
+        "scenes": scenes,
+    }
+
+
+def summary(result: dict[str, Any]) -> str:
+    """Return the table of errors over the scenes."""
+    scenes = result["scenes"]
+    table = np.array([[np.nan if e is None else e for e in s["error"]] for s in scenes])
+    rows = [["error", *result["parameters"]]]
+    for name, statistic in (("mean", np.nanmean), ("median", np.nanmedian), ("largest", np.nanmax)):
+        rows.append([name, *(f"{value:.4f}" for value in statistic(table, axis=0))])
+    return (
+        f"{columns(rows)}\n{result['within']} of {len(scenes)} scenes are OK with all errors "
+        f"within {result['tolerance']:g}"
+    )
+
+
+def main() -> int:
+    """Run the executable ``check_perception``."""
+    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    with ros_session("check_perception"):
+        result = check(options)
+    print(summary(result))
+    if options.json:
+        write_json(options.json, result)
+    return 0 if result["within"] == len(result["scenes"]) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

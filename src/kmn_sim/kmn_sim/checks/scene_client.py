@@ -1,0 +1,139 @@
+"""Puts scenes before a running sim_node and takes what a running morph_node makes of them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import rclpy
+from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.node import Node
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
+from kmn_sim.ros.messages import seconds
+
+START_TIMEOUT = 180.0  # seconds for both nodes to load and compile
+ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene
+CAMERA_RATE = 4.0  # frames a second; morph_node shall not fall behind
+
+
+class Answer(NamedTuple):
+    """True and estimated morphing parameters (n + m,) of a scene, and how it went.
+
+    Attributes
+    ----------
+    status, reason
+        Of morph_node's message.
+    latency
+        Seconds from the exposure to the reception of the estimate.
+    """
+
+    truth: NDArray[np.float64]
+    estimate: NDArray[np.float64]
+    status: int
+    reason: str
+    latency: float
+
+
+class SceneClient:
+    """A client of both nodes.
+
+    Parameters
+    ----------
+    node
+        In the namespace of the two.
+    processes
+        The two, which are watched.
+    """
+
+    def __init__(self, node: Node, processes: list[NodeProcess]) -> None:
+        self._client = ProcessClient(node, processes)
+        self._estimates: list[tuple[MorphingParameters, float]] = []
+        self._truths: list[MorphingParameters] = []
+        node.create_subscription(MorphingParameters, "morphing_parameters", self._keep, 10)
+        node.create_subscription(MorphingParameters, "ground_truth", self._truths.append, 10)
+        self._setting = node.create_client(
+            SetParametersAtomically, "sim_node/set_parameters_atomically"
+        )
+        self._client.wait(self._setting.service_is_ready, START_TIMEOUT, "sim_node")
+        self._client.wait(
+            lambda: node.count_publishers(f"{node.get_namespace()}/morphed_model"),
+            START_TIMEOUT,
+            "morph_node",
+        )
+
+    def show(self, values: NDArray[np.float64]) -> Answer:
+        """Set a scene of morphing parameters (n + m,) and return the estimate of it.
+
+        Raises
+        ------
+        ProcessError
+            If a node has ended, or there is no answer.
+        """
+        scene = {"placement": "given", "values": [float(value) for value in values]}
+        self._client.set_parameters(self._setting, scene, ANSWER_TIMEOUT)
+        self._truths.clear()
+        self._estimates.clear()
+        estimate, received = self._client.wait(self._answered, ANSWER_TIMEOUT, "morph_node")
+        truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
+        return Answer(
+            np.array([*truth.theta, *truth.gamma]),
+            np.array([*estimate.theta, *estimate.gamma]),
+            int(estimate.status),
+            estimate.reason,
+            received - seconds(estimate.header.stamp),
+        )
+
+    def _keep(self, estimate: MorphingParameters) -> None:
+        self._estimates.append((estimate, time.time()))
+
+    def _answered(self) -> tuple[MorphingParameters, float] | None:
+        """Return an estimate of an exposure of the present scene."""
+        stamps = [truth.header.stamp for truth in self._truths]
+        return next((pair for pair in self._estimates if pair[0].header.stamp in stamps), None)
+
+
+@contextmanager
+def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Iterator[SceneClient]:
+    """Start both nodes in a namespace of their own, for the scenes of a model.
+
+    Parameters
+    ----------
+    name
+        The model's name or file.
+    noise, seed
+        Of the simulated sensor.
+    """
+    alone = f"__ns:=/sim_{os.getpid()}"  # whatever else runs here is not disturbed
+    sim: dict[str, Any] = {
+        "model": name,
+        "placement": "given",
+        "values": [0.0] * len(model.parameters),
+    }
+    sim |= {"noise": noise, "seed": seed, "camera_rate": CAMERA_RATE}
+    morph = {"model": name, "reliability": "reliable"}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        processes = [
+            stack.enter_context(
+                NodeProcess(
+                    module, [*parameter_arguments(parameters), "-r", alone], folder / module
+                )
+            )
+            for module, parameters in (
+                ("kmn_sim.ros.start_sim_node", sim),
+                ("kmn_perception.ros.start_morph_node", morph),
+            )
+        ]
+        node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])
+        stack.callback(node.destroy_node)
+        yield SceneClient(node, processes)

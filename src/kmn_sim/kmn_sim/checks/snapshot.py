@@ -1,0 +1,72 @@
+"""Save a picture of the robot and an object."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from kmn_perception.command_line.arguments import output_file
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.sensors.recording import snapshot
+from kmn_sim.world.scenario import DIRECTIONS, Scenario
+from kmn_sim.world.simulation import Simulation
+
+WIDTH, HEIGHT = 960, 720
+SETTLING = 0.2  # simulated seconds
+
+
+def arguments() -> argparse.Namespace:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(prog="snapshot", description=__doc__)
+    parser.add_argument("--model", default="door", help="shipped name or file (default door)")
+    for name in ("theta", "gamma"):
+        parser.add_argument(
+            f"--{name}", type=float, nargs="*", help="parameters; the prototype's if not given"
+        )
+    parser.add_argument("--direction", choices=DIRECTIONS, default="pull")
+    for option in ("frame", "wall", "table"):
+        parser.add_argument(f"--{option}", action="store_true")
+    parser.add_argument("--out", type=output_file, default=Path("simulation.png"))
+    return parser.parse_args()
+
+
+def scenario_of(options: argparse.Namespace) -> Scenario:
+    """Return the scenario that was asked for."""
+    model = KinematicModel.load(options.model)
+    parts = [
+        np.zeros(len(parameters)) if given is None else np.array(given)
+        for given, parameters in ((options.theta, model.theta), (options.gamma, model.gamma))
+    ]
+    return Scenario(
+        model,
+        np.concatenate(parts),
+        options.direction,
+        frame=options.frame,
+        wall=options.wall,
+        table=options.table,
+    )
+
+
+def main() -> int:
+    """Run the executable ``snapshot``."""
+    options = arguments()
+    try:
+        simulation = Simulation(scenario_of(options))
+        simulation.run(SETTLING)
+        picture = snapshot(simulation, WIDTH, HEIGHT)
+        simulation.close()
+        if not cv2.imwrite(str(options.out), np.ascontiguousarray(picture[..., ::-1])):
+            raise OSError(f"cannot write {options.out}")
+    except (OSError, ValueError, cv2.error) as error:
+        print(f"snapshot: {error}", file=sys.stderr)
+        return 1
+    print(f"The picture is {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""Writes the PR2 of the package robotic as a URDF with its meshes.
+
+The model is that of PR2/pr2_common (BSD, Willow Garage), as converted by its authors to the format
+of robotic; what is generated here keeps that licence. Joints that do not move in the simulator
+are fixed where the model has them, and what they carry becomes part of the link before them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_sim.robot.settings import RobotSettings
+
+BASE = "worldTranslationRotation"
+BASE_LIMITS = ((-10.0, 10.0), (-10.0, 10.0), (-6.0, 6.0))  # metres, metres, radians; of the model
+BASE_AXES = (("prismatic", "1 0 0"), ("prismatic", "0 1 0"), ("revolute", "0 0 1"))
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+SMALL_MASS, SMALL_INERTIA = 0.1, 1e-3  # of the base's first two links, kg and kg m^2
+DARK_PARTS = ("finger", "caster", "wheel")
+LIGHT, DARK = "0.86 0.87 0.89 1", "0.22 0.23 0.26 1"
+NOTICE = (
+    "Generated from the PR2 model of the package robotic; from PR2/pr2_common pr2_description, "
+    "Copyright Willow Garage, Inc., BSD licence."
+)
+
+
+class Inertia(NamedTuple):
+    """Mass in kg, centre of mass (3,) in m, and inertia (3, 3) about it in kg m^2."""
+
+    mass: float
+    centre: NDArray[np.float64]
+    tensor: NDArray[np.float64]
+
+
+def export(settings: RobotSettings, folder: Path) -> None:
+    """Write ``pr2.urdf`` and its meshes into a folder.
+
+    Raises
+    ------
+    ImportError, OSError
+        If the package robotic, or a library that it needs, is missing.
+    """
+    import robotic
+
+    configuration = robotic.Config()
+    configuration.addFile(robotic.raiPath(settings.source))
+    robot = ElementTree.Element("robot", name="pr2")
+    robot.append(ElementTree.Comment(NOTICE))
+    movable = {BASE, *settings.joints, *settings.followers} - set(settings.names[:3])
+    _base_joints(robot, settings)
+    frames = [configuration.getFrame(name) for name in configuration.getFrameNames()]
+    carrier = {frame.name: _carrier(frame, movable) for frame in frames}
+    for frame in frames:
+        if frame.name in movable:
+            parts = [part for part in frames if carrier[part.name] == frame.name]
+            robot.append(_link(frame, parts, folder))
+        if frame.name in movable and frame.name != BASE:
+            parent = configuration.getFrame(carrier[frame.getParent().name])
+            robot.append(_joint(frame, parent, settings))
+    ElementTree.indent(robot)
+    ElementTree.ElementTree(robot).write(folder / "pr2.urdf", encoding="utf-8")
+
+
+def link_name(joint: str) -> str:
+    """Return the name of the link that a joint of the model moves."""
+    return "base_link" if joint == BASE else joint.replace("_joint", "_link")
+
+
+def _carrier(frame: Any, movable: set[str]) -> str | None:
+    """Return the movable frame that a frame is fixed to; None for the world."""
+    while frame is not None and frame.name not in movable:
+        frame = frame.getParent()
+    return None if frame is None else str(frame.name)
+
+
+def _relative(frame: Any, origin: Any) -> NDArray[np.float64]:
+    """Return the pose (4, 4) of a frame in another one."""
+    relative: NDArray[np.float64] = np.linalg.inv(origin.getTransform()) @ frame.getTransform()
+    return relative
+
+
+def _base_joints(robot: ElementTree.Element, settings: RobotSettings) -> None:
+    """Add the chain of the links world, base_x and base_y, up to base_link."""
+    ElementTree.SubElement(robot, "link", name="world")
+    small = Inertia(SMALL_MASS, np.zeros(3), SMALL_INERTIA * np.eye(3))
+    links = ["world", "base_x_link", "base_y_link", link_name(BASE)]
+    for name in links[1:3]:
+        robot.append(_inertial_link(name, small))
+    for i, name in enumerate(settings.names[:3]):
+        kind, axis = BASE_AXES[i]
+        joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+        ElementTree.SubElement(joint, "parent", link=links[i])
+        ElementTree.SubElement(joint, "child", link=links[i + 1])
+        ElementTree.SubElement(joint, "axis", xyz=axis)
+        joint.append(_limit(BASE_LIMITS[i], settings, name))
+
+
+def _joint(frame: Any, parent: Any, settings: RobotSettings) -> ElementTree.Element:
+    """Return the joint that moves a frame; its origin is where the joint is at zero."""
+    attributes = frame.getAttributes()
+    axis = np.multiply(AXES[attributes["joint"][-1]], attributes.get("joint_scale", 1.0))
+    limits = attributes.get("limits")
+    joint = ElementTree.Element(
+        "joint", name=frame.name, type="revolute" if limits else "continuous"
+    )
+    ElementTree.SubElement(joint, "parent", link=link_name(parent.name))
+    ElementTree.SubElement(joint, "child", link=link_name(frame.name))
+    joint.append(_origin(_relative(frame.getParent(), parent)))
+    ElementTree.SubElement(joint, "axis", xyz=_text(axis))
+    joint.append(_limit(limits, settings, frame.name))
+    return joint
+
+
+def _limit(
+    limits: tuple[float, float] | None, settings: RobotSettings, name: str
+) -> ElementTree.Element:
+    motor = settings.joints[settings.leader if name in settings.followers else name]
+    attributes = {"effort": f"{motor.effort}", "velocity": f"{motor.velocity}"}
+    if limits is not None:
+        attributes.update(lower=f"{limits[0]}", upper=f"{limits[1]}")
+    return ElementTree.Element("limit", attributes)
+
+
+def _link(frame: Any, parts: list[Any], folder: Path) -> ElementTree.Element:
+    """Return the link of all parts that are fixed to a frame, in that frame."""
+    link = _inertial_link(
+        link_name(frame.name),
+        _together([inertia for part in parts if (inertia := _inertia(part, frame)).mass > 0.0]),
+    )
+    for part in parts:
+        if part.getShapeType().name != "mesh":
+            continue
+        file = folder / f"{part.name}.obj"
+        _write_mesh(part, _relative(part, frame), file)
+        for kind in ("visual", "collision"):
+            element = ElementTree.SubElement(link, kind)
+            geometry = ElementTree.SubElement(element, "geometry")
+            ElementTree.SubElement(geometry, "mesh", filename=file.name)
+            if kind == "visual":
+                shade = "dark" if any(word in part.name for word in DARK_PARTS) else "light"
+                material = ElementTree.SubElement(element, "material", name=shade)
+                colour = DARK if shade == "dark" else LIGHT
+                ElementTree.SubElement(material, "color", rgba=colour)
+    return link
+
+
+def _inertia(part: Any, frame: Any) -> Inertia:
+    """Return the inertia of a part, in another frame; without a mass none."""
+    attributes: Mapping[str, Any] = part.getAttributes()
+    pose = _relative(part, frame)
+    xx, xy, xz, yy, yz, zz = _six(attributes.get("inertia", (0.0,) * 6))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Inertia(
+        float(attributes.get("mass", 0.0)), pose[:3, 3], pose[:3, :3] @ tensor @ pose[:3, :3].T
+    )
+
+
+def _six(inertia: Any) -> tuple[float, ...]:
+    """Return the six entries of an inertia that may be given by its diagonal only."""
+    if len(inertia) == 3:
+        return (inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2])
+    return tuple(inertia)
+
+
+def _together(parts: list[Inertia]) -> Inertia:
+    """Return the inertia of parts that are fixed to each other (parallel axis theorem)."""
+    mass = sum(part.mass for part in parts)
+    centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for part in parts:
+        arm = part.centre - centre
+        tensor += part.tensor + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return Inertia(mass, centre, tensor)
+
+
+def _inertial_link(name: str, inertia: Inertia) -> ElementTree.Element:
+    link = ElementTree.Element("link", name=name)
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_text(inertia.centre))
+    ElementTree.SubElement(inertial, "mass", value=f"{inertia.mass}")
+    entries = {
+        f"i{'xyz'[i]}{'xyz'[j]}": f"{inertia.tensor[i, j]}" for i in range(3) for j in range(i, 3)
+    }
+    ElementTree.SubElement(inertial, "inertia", entries)
+    return link
+
+
+def _origin(pose: NDArray[np.float64]) -> ElementTree.Element:
+    """Return an origin with the fixed-axis angles roll, pitch and yaw of a pose."""
+    r = pose[:3, :3]
+    pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
+    roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
+    return ElementTree.Element("origin", xyz=_text(pose[:3, 3]), rpy=_text((roll, pitch, yaw)))
+
+
+def _text(values: Any) -> str:
+    return " ".join(f"{value:.12g}" for value in values)
+
+
+def _write_mesh(part: Any, pose: NDArray[np.float64], file: Path) -> None:
+    """Write the triangles of a part, in the frame in which it has a pose."""
+    points = part.getMeshPoints() @ pose[:3, :3].T + pose[:3, 3]
+    lines = [f"# {NOTICE}"]
+    lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
+    lines += [f"f {a} {b} {c}" for a, b, c in part.getMeshTriangles() + 1]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,4 @@
+"""sim_node: the simulated world behind topics, services and parameters.
+
+Imports all other rooms but ``checks``, which stands on top of it.
+"""

@@ -1,0 +1,91 @@
+"""Conversions between ROS messages and what the simulation has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Duration, Time
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.world.scenario import Scenario
+
+NANO = 1e-9
+
+
+def seconds(stamp: Time | Duration) -> float:
+    """Return a stamp or a duration in seconds."""
+    return float(stamp.sec + NANO * stamp.nanosec)
+
+
+def stamp_of(time: float) -> Time:
+    """Return the stamp of a time in seconds."""
+    nanoseconds = round(time / NANO)
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def command_from_message(
+    message: JointTrajectory, to_simulated: Callable[[float], float]
+) -> Command:
+    """Read a trajectory; a stamp of 0 means at once.
+
+    Parameters
+    ----------
+    to_simulated
+        Converts the time of stamps into simulated time, both in seconds.
+    """
+    stamp = seconds(message.header.stamp)
+    return Command(
+        names=tuple(message.joint_names),
+        points=[
+            Waypoint(
+                seconds(point.time_from_start),
+                *map(tuple, (point.positions, point.velocities, point.accelerations, point.effort)),
+            )
+            for point in message.points
+        ],
+        start=to_simulated(stamp) if stamp != 0.0 else None,
+    )
+
+
+def joint_state(
+    names: Sequence[str],
+    positions: Iterable[float],
+    velocities: Iterable[float],
+    efforts: Iterable[float],
+    header: Header,
+) -> JointState:
+    """Make the message of some joints' state."""
+    return JointState(
+        header=header,
+        name=list(names),
+        position=[float(value) for value in positions],
+        velocity=[float(value) for value in velocities],
+        effort=[float(value) for value in efforts],
+    )
+
+
+def ground_truth(
+    scenario: Scenario, values: NDArray[np.float64], header: Header
+) -> MorphingParameters:
+    """Make the message of the true morphing parameters (n + m,); the door's, when closed."""
+    model = scenario.model
+    theta, gamma = model.split(values)
+    return MorphingParameters(
+        header=header,
+        model=model.name,
+        theta_names=[parameter.name for parameter in model.theta],
+        theta=theta.tolist(),
+        gamma_names=[parameter.name for parameter in model.gamma],
+        gamma=gamma.tolist(),
+        covariance=[0.0] * values.size**2,
+        transform=model.transformation.matrix(theta).ravel(),
+        converged=True,
+        residual=0.0,
+        status=MorphingParameters.OK,
+    )

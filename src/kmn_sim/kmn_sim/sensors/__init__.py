@@ -1,0 +1,4 @@
+"""What sees the world: renderer, depth camera with its noise, and recordings of a run.
+
+Imports ``world``; without ROS.
+"""

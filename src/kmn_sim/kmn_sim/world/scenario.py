@@ -1,0 +1,78 @@
+"""What stands in the world: which object, with which parameters, and what is around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.model.kinematic_model import KinematicModel
+
+DIRECTIONS = ("pull", "push")
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be built; the text says what is wrong with it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """An object m(theta, gamma) and its surroundings.
+
+    Attributes
+    ----------
+    model
+        Kinematic model of the object; one with joints is a door.
+    values
+        (n + m,) morphing parameters (theta, gamma).
+    direction
+        Whether a door opens towards the robot (``pull``) or away from it (``push``).
+    stem, frame, wall
+        Whether a door has a stem between lever and panel, a frame, and a wall around it.
+    floor
+        Whether there is a floor.
+    table
+        Whether a box stands on a table; then z = 0 is the table's top.
+    """
+
+    model: KinematicModel
+    values: NDArray[np.float64]
+    direction: str = "pull"
+    stem: bool = True
+    frame: bool = False
+    wall: bool = False
+    floor: bool = True
+    table: bool = False
+
+    def __post_init__(self) -> None:
+        if self.direction not in DIRECTIONS:
+            raise ScenarioError(
+                f"'direction' must be one of {', '.join(DIRECTIONS)}, found '{self.direction}'"
+            )
+        parameters = self.model.parameters
+        if self.values.shape != (len(parameters),):
+            names = ", ".join(parameter.name for parameter in parameters)
+            raise ScenarioError(
+                f"model '{self.model.name}' has {len(parameters)} parameters ({names}), "
+                f"found {self.values.size} values"
+            )
+        for parameter, value in zip(parameters, self.values, strict=True):
+            low, high = parameter.limits
+            if not low <= value <= high:
+                raise ScenarioError(f"{parameter.name} = {value:g} is outside [{low:g}, {high:g}]")
+
+    @property
+    def is_door(self) -> bool:
+        """Whether the object has joints."""
+        return bool(self.model.joints)
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """(n,) transformation parameters."""
+        return self.model.split(self.values)[0]
+
+    @property
+    def gamma(self) -> NDArray[np.float64]:
+        """(m,) configuration parameters."""
+        return self.model.split(self.values)[1]

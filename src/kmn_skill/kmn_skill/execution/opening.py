@@ -1,0 +1,314 @@
+"""Opens a door: waits for its parameters, plans, follows the plan, and tries again if need be."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.model.kinematic_model import Joint, KinematicModel
+from kmn_skill.execution.door_memory import DoorMemory
+from kmn_skill.execution.errors import (
+    CancelledError,
+    DoorError,
+    ExecutionError,
+    GoalError,
+    SkillError,
+    StatesError,
+)
+from kmn_skill.execution.perceived_door import PerceivedDoor, when_closed
+from kmn_skill.execution.plan_execution import Execution, ExecutionSettings, Part
+from kmn_skill.execution.states import StateWatch, WorldState
+from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
+from kmn_skill.planning.planner import Planner
+
+POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
+WAIT, PLAN = "wait", "plan"  # phases before those of the plan
+SUCCESS = "success"  # outcome of a goal that was reached
+# What a camera tells of a door that the robot hides.
+HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
+
+
+class Goal(NamedTuple):
+    """Angles (rad) to which to press the handle and to open the door."""
+
+    handle_angle: float
+    door_angle: float
+
+
+class Result(NamedTuple):
+    """How a goal ended.
+
+    Attributes
+    ----------
+    outcome
+        `SUCCESS`, or a short key of what went wrong.
+    reason
+        Why not, for people to read; empty on success.
+    handle_angle, door_angle
+        Largest handle angle reached, and the door angle in the end, radians.
+    report
+        What the check of the last plan found, if there was one.
+    attempts
+        Plans that were begun.
+    tracking_error
+        Largest one, in units of the tolerances.
+    """
+
+    outcome: str
+    reason: str
+    handle_angle: float
+    door_angle: float
+    report: PlanReport | None
+    attempts: int
+    tracking_error: float
+
+
+class Feedback(NamedTuple):
+    """What is being done: phase, part of it all that is done (0 to 1), and the door's angles."""
+
+    phase: str
+    progress: float
+    handle_angle: float
+    door_angle: float
+
+
+class Commands(Protocol):
+    """What moves the robot."""
+
+    def now(self) -> float:
+        """Return the present time on the clock of the robot's states, seconds."""
+
+    def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
+        """Show a plan for a door of some morphing parameters (n + m,)."""
+
+    def send(self, part: Part) -> None:
+        """Send a part of the plan."""
+
+    def hold(self) -> None:
+        """Let the robot hold where it is."""
+
+    def tell(self, text: str) -> None:
+        """Tell people what happened."""
+
+
+@dataclass(frozen=True)
+class OpeningSettings:
+    """How long and how often it is tried, and what counts as reached.
+
+    Attributes
+    ----------
+    door_timeout
+        Seconds that a goal waits for parameters to rely on.
+    retries
+        Further attempts after the robot or the door did not follow.
+    handle_tolerance, door_tolerance
+        By which the angles (rad) may miss the goal.
+    hidden_distance
+        Metres after which the robot hides the door; then where it was before is relied upon.
+    """
+
+    door_timeout: float
+    retries: int
+    handle_tolerance: float
+    door_tolerance: float
+    hidden_distance: float
+
+
+class DoorOpening:
+    """One goal, from its check to its result.
+
+    Parameters
+    ----------
+    model
+        Kinematic model of the door.
+    door, memory, watch
+        What is known of the door, of the door before, and of the states.
+    planner, commands
+        What plans and what moves.
+    cancelled
+        Tells whether the goal was cancelled.
+    feedback
+        Is told what is being done.
+    """
+
+    def __init__(
+        self,
+        model: KinematicModel,
+        door: PerceivedDoor,
+        memory: DoorMemory,
+        watch: StateWatch,
+        planner: Planner,
+        commands: Commands,
+        settings: OpeningSettings,
+        execution: ExecutionSettings,
+        cancelled: Callable[[], bool],
+        feedback: Callable[[Feedback], None],
+    ) -> None:
+        self._model, self._door, self._memory, self._watch = model, door, memory, watch
+        self._planner, self._commands = planner, commands
+        self._settings, self._execution = settings, execution
+        self._cancelled, self._feedback = cancelled, feedback
+        self._breaks = watch.breaks
+        self._handle = self._hinge = math.nan
+        self._plan_report: PlanReport | None = None
+        self._attempts = 0
+        self._tracking_error = 0.0
+
+    def run(self, goal: Goal) -> Result:
+        """Open the door; in the end the robot stands still, whatever happened."""
+        try:
+            self._check(goal)
+            self._open(goal)
+            self._memory.interrupted = False
+        except SkillError as error:
+            self._commands.hold()
+            return self._result(error.reason, str(error))
+        except Exception:
+            self._commands.hold()
+            raise
+        return self._result(SUCCESS, "")
+
+    def _result(self, outcome: str, reason: str) -> Result:
+        return Result(
+            outcome,
+            reason,
+            self._handle,
+            self._hinge,
+            self._plan_report,
+            self._attempts,
+            self._tracking_error,
+        )
+
+    def _check(self, goal: Goal) -> None:
+        """Raise if the door's joints cannot have the goal's angles."""
+        hinge, handle = self._model.joints
+        _check_angle("handle_angle", goal.handle_angle, handle)
+        _check_angle("door_angle", goal.door_angle, hinge)
+        if abs(goal.door_angle) <= self._settings.door_tolerance:
+            raise GoalError(
+                "bad_goal",
+                f"door_angle = {goal.door_angle:g} does not open the door, expected more than "
+                f"the tolerance {self._settings.door_tolerance:g} rad to either side",
+            )
+
+    def _open(self, goal: Goal) -> None:
+        """Try it, again and again; raise if it did not work out."""
+        values = self._wait_for_door()
+        for retries_left in reversed(range(self._settings.retries + 1)):
+            try:
+                self._follow(self._plan(values, goal))
+                self._check_reached(goal)
+                return
+            except ExecutionError as error:
+                self._commands.hold()
+                if not retries_left:
+                    raise
+                self._commands.tell(f"{error}; trying again from here")
+
+    def _wait_for_door(self) -> NDArray[np.float64]:
+        """Return the parameters (n + m,) of the door when closed."""
+        deadline = time.monotonic() + self._settings.door_timeout
+        while True:
+            self._breaks = self._watch.breaks  # in which world it begins does not matter
+            try:
+                state = self._state()
+                self._report(WAIT, 0.0, state)
+                return self._door_from(state)
+            except (StatesError, DoorError):
+                if time.monotonic() > deadline:
+                    raise
+            time.sleep(POLL_PERIOD)
+
+    def _door_from(self, state: WorldState) -> NDArray[np.float64]:
+        """Return the parameters (n + m,) of the closed door, as seen before the robot hid it."""
+        before = self._memory.recall(state.robot, self._settings.hidden_distance)
+        try:
+            seen = self._door.values(self._commands.now())
+        except DoorError as error:
+            if before is None or not self._memory.interrupted or error.reason not in HIDDEN:
+                raise
+        if before is not None:
+            self._commands.tell("relying on where the door was before the robot drove up to it")
+            return before
+        values = when_closed(self._model, seen, state.hinge)
+        self._memory.keep(values, state.robot)
+        return values
+
+    def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:
+        state = self._state()
+        self._report(PLAN, 0.0, state)
+        self._attempts += 1
+        theta, gamma = self._model.split(values)
+        request = PlanRequest(
+            theta=theta,
+            gamma=gamma,
+            start=state.robot,
+            door_start=np.array([state.hinge, state.handle]),
+            handle_angle=goal.handle_angle,
+            door_angle=goal.door_angle,
+        )
+        try:
+            plan = self._planner.plan(request, cancelled=self._cancelled)
+        except PlanningCancelled as error:
+            raise CancelledError("cancelled", "the goal was cancelled") from error
+        except PlanningFailed as error:
+            raise SkillError("no_plan", f"there is no plan: {error}") from error
+        self._plan_report = plan.report
+        self._commands.show(plan, values)
+        return plan
+
+    def _follow(self, plan: Plan) -> None:
+        """Send a plan part by part until all is done and at rest."""
+        execution = Execution(plan, self._commands.now(), self._execution)
+        finished = False
+        while not finished:
+            state = self._state()
+            part, phase, progress, finished = execution.step(self._commands.now(), state)
+            self._tracking_error = max(self._tracking_error, execution.tracking_error)
+            if part is not None:
+                self._commands.send(part)
+            self._report(phase, progress, state)
+            self._watch.wait(POLL_PERIOD)
+
+    def _state(self) -> WorldState:
+        """Return the newest state; raise if the goal was cancelled or the world is another one."""
+        if self._cancelled():
+            raise CancelledError("cancelled", "the goal was cancelled")
+        if self._watch.breaks != self._breaks:
+            raise StatesError("another_world", self._watch.last_break)
+        state = self._watch.newest(self._commands.now())
+        self._hinge = state.hinge
+        if not abs(state.handle) <= abs(self._handle):
+            self._handle = state.handle
+        return state
+
+    def _report(self, phase: str, progress: float, state: WorldState) -> None:
+        self._feedback(Feedback(phase, progress, state.handle, state.hinge))
+
+    def _check_reached(self, goal: Goal) -> None:
+        """Raise if handle or door are not where the goal has them."""
+        settings = self._settings
+        for what, reached, wanted, tolerance in (
+            ("handle", self._handle, goal.handle_angle, settings.handle_tolerance),
+            ("door", self._hinge, goal.door_angle, settings.door_tolerance),
+        ):
+            if math.copysign(1.0, wanted) * reached < abs(wanted) - tolerance:
+                raise ExecutionError(
+                    "missed", f"the {what} came to {reached:.2f} rad, expected {wanted:.2f} rad"
+                )
+
+
+def _check_angle(name: str, angle: float, joint: Joint) -> None:
+    low, high = joint.limits
+    if not low <= angle <= high:
+        raise GoalError(
+            "bad_goal",
+            f"{name} = {angle:g} is beyond the joint '{joint.name}', "
+            f"expected [{low:g}, {high:g}] rad",
+        )

@@ -1,0 +1,292 @@
+"""Which door the skill may rely on: what perception found, once it is sure enough for a grasp."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.errors import DoorError
+from kmn_skill.planning.kinematics import turn
+
+HANDLE, HINGE, YAW = slice(0, 3), slice(3, 5), slice(5, 6)  # of the quantities of a grasp
+STEP = 1e-6  # of the parameters, for derivatives
+MAX_FRAMES = 100  # that are kept
+
+
+@dataclass(frozen=True)
+class DoorSettings:
+    """What is asked of the door's parameters.
+
+    Attributes
+    ----------
+    max_age
+        Seconds that the newest may be old.
+    frames
+        So many frames in a row must be usable and agree.
+    max_distance, max_angle
+        By which handle and hinge (m), and the yaw (rad), may differ among these frames.
+    max_handle_std, max_hinge_std, max_yaw_std
+        Largest standard deviations of the handle's and the hinge's position (m) and the yaw (rad).
+    need_covariance
+        Whether parameters whose covariance is unknown are refused.
+    limit_margin
+        Part of its range by which a parameter may exceed its limits.
+    """
+
+    max_age: float
+    frames: int
+    max_distance: float
+    max_angle: float
+    max_handle_std: float
+    max_hinge_std: float
+    max_yaw_std: float
+    need_covariance: bool
+    limit_margin: float
+
+
+class Observation(NamedTuple):
+    """Morphing parameters as they came.
+
+    Attributes
+    ----------
+    time
+        Of the exposure, seconds.
+    model, frame
+        Names of the kinematic model and of the frame that the door is given in.
+    names
+        Names of theta and gamma.
+    values
+        (n + m,) theta and gamma [m, rad, 1].
+    covariance
+        (n + m, n + m) of the values; NaN where unknown.
+    problem
+        Why they are not valid; empty if they are.
+    """
+
+    time: float
+    model: str
+    frame: str
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    problem: str
+
+
+def grasp_quantities(model: KinematicModel, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a grasp depends on: position of the handle, of the hinge, yaw (6,) [m, rad]."""
+    theta, gamma = model.split(values)
+    hinge, handle = model.joints
+    lever = next(body for body in model.bodies if body.name == handle.body)
+    pose = model.transformation.matrix(theta)
+    points = np.array([[*lever.centre(gamma), 1.0], [*hinge.origin(gamma), 1.0]]) @ pose.T
+    yaw = model.transformation.components(theta).yaw
+    return np.array([*points[0, :3], *points[1, :2], float(yaw)])
+
+
+def grasp_deviations(
+    model: KinematicModel, values: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return the largest standard deviations of handle (m), hinge (m) and yaw (rad).
+
+    Parameters
+    ----------
+    covariance
+        (n + m, n + m) of the values (n + m,).
+    """
+    steps = STEP * np.eye(values.size)
+    slopes = [
+        (grasp_quantities(model, values + step) - grasp_quantities(model, values - step))
+        / (2.0 * STEP)
+        for step in steps
+    ]
+    jacobian = np.array(slopes).T
+    spread = jacobian @ covariance @ jacobian.T
+    handle, hinge, yaw = (
+        math.sqrt(max(float(np.linalg.eigvalsh(spread[part, part])[-1]), 0.0))
+        for part in (HANDLE, HINGE, YAW)
+    )
+    return handle, hinge, yaw
+
+
+def when_closed(
+    model: KinematicModel, values: NDArray[np.float64], hinge_angle: float
+) -> NDArray[np.float64]:
+    """Return the parameters (n + m,) of the same door when closed.
+
+    Parameters
+    ----------
+    values
+        (n + m,) parameters as seen; perception takes every door for a closed one.
+    hinge_angle
+        By which it was open, radians.
+    """
+    theta, gamma = model.split(values)
+    shut = model.transformation.matrix(theta) @ turn(model.joints[0], gamma, -hinge_angle)
+    closed = model.transformation.read_back(shut)
+    return np.concatenate([closed, gamma])
+
+
+class PerceivedDoor:
+    """Keeps the newest observations of a door; thread-safe.
+
+    Parameters
+    ----------
+    model
+        Kinematic model that the parameters must be of.
+    frame
+        Frame that the door must be given in.
+
+    Attributes
+    ----------
+    settings
+        May be replaced.
+    """
+
+    def __init__(self, model: KinematicModel, frame: str, settings: DoorSettings) -> None:
+        self._model, self._frame, self.settings = model, frame, settings
+        self._lock = threading.Lock()
+        self._kept: deque[Observation] = deque(maxlen=MAX_FRAMES)
+        self._refused: DoorError | None = None  # the last one
+        self._since = -math.inf  # seconds; what was seen before was another world
+
+    def add(self, observation: Observation) -> None:
+        """Keep an observation; one that is not usable parts those before from those after.
+
+        Raises
+        ------
+        DoorError
+            If it is not usable.
+        """
+        with self._lock:
+            try:
+                self._check(observation)
+            except DoorError as refused:
+                self._kept.clear()
+                self._refused = refused
+                raise
+            if observation.time < self._since:
+                return  # came late, of another world
+            if self._kept and observation.time == self._kept[-1].time:
+                return  # the same exposure once more
+            if self._kept and observation.time < self._kept[-1].time:
+                self._kept.clear()  # the clock was set back: another world
+            self._kept.append(observation)
+
+    def forget(self, now: float) -> None:
+        """Forget all observations from before a time (s), as of another world."""
+        with self._lock:
+            self._kept.clear()
+            self._refused = None
+            self._since = now
+
+    def values(self, now: float) -> NDArray[np.float64]:
+        """Return the mean parameters (n + m,) of the frames that agree.
+
+        Parameters
+        ----------
+        now
+            Present time on the clock of the observations, seconds.
+
+        Raises
+        ------
+        DoorError
+            If there are none to rely on.
+        """
+        settings, model = self.settings, self._model
+        with self._lock:
+            kept, refused = list(self._kept)[-settings.frames :], self._refused
+        if not kept:
+            raise refused or DoorError("none", "no morphing parameters came yet")
+        _check_age(now - kept[-1].time, settings.max_age)
+        if len(kept) < settings.frames:
+            before = f"; before: {refused}" if refused else ""
+            raise DoorError(
+                "few_frames",
+                f"{len(kept)} usable frame(s) in a row, expected {settings.frames}{before}",
+            )
+        quantities = np.array([grasp_quantities(model, each.values) for each in kept])
+        spread = np.ptp(quantities, axis=0)
+        distance, angle = float(spread[: YAW.start].max()), float(spread[YAW].max())
+        if distance > settings.max_distance or angle > settings.max_angle:
+            raise DoorError(
+                "disagreement",
+                f"the last {len(kept)} frames differ by {distance:.3f} m and {angle:.3f} rad, "
+                f"expected at most {settings.max_distance:g} m and {settings.max_angle:g} rad",
+            )
+        values: NDArray[np.float64] = np.mean([each.values for each in kept], axis=0)
+        self._check_certainty(values, np.mean([each.covariance for each in kept], axis=0))
+        return values
+
+    def _check(self, observation: Observation) -> None:
+        """Raise if an observation is not usable at all."""
+        model = self._model
+        names = tuple(parameter.name for parameter in model.parameters)
+        if observation.model != model.name:
+            raise DoorError(
+                "model", f"parameters are of model '{observation.model}', expected '{model.name}'"
+            )
+        if observation.problem:
+            raise DoorError("status", observation.problem)
+        if observation.frame != self._frame:
+            raise DoorError(
+                "frame", f"the door is given in '{observation.frame}', expected '{self._frame}'"
+            )
+        count = len(names)
+        shapes = observation.values.shape, observation.covariance.shape
+        if observation.names != names or shapes != ((count,), (count, count)):
+            raise DoorError(
+                "names",
+                f"found the {observation.values.size} parameters {', '.join(observation.names)} "
+                f"with {observation.covariance.size} covariances, expected {', '.join(names)}",
+            )
+        if not np.isfinite(observation.values).all():
+            raise DoorError(
+                "not_finite", f"parameters are not finite: {observation.values.tolist()}"
+            )
+        for parameter, value in zip(model.parameters, observation.values, strict=True):
+            low, high = parameter.limits
+            margin = self.settings.limit_margin * (high - low)
+            if not low - margin <= value <= high + margin:
+                raise DoorError(
+                    "out_of_limits",
+                    f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]",
+                )
+
+    def _check_certainty(
+        self, values: NDArray[np.float64], covariance: NDArray[np.float64]
+    ) -> None:
+        """Raise if what matters for the grasp is too uncertain."""
+        settings = self.settings
+        if not np.isfinite(covariance).all():
+            if settings.need_covariance:
+                raise DoorError("covariance", "the parameters' covariance is unknown")
+            return
+        found = grasp_deviations(self._model, values, covariance)
+        allowed = settings.max_handle_std, settings.max_hinge_std, settings.max_yaw_std
+        for what, deviation, most in zip(("handle", "hinge", "yaw"), found, allowed, strict=True):
+            if deviation > most:
+                raise DoorError(
+                    "uncertain",
+                    f"the standard deviation of the {what} is {deviation:.4f}, "
+                    f"expected at most {most:g} [m, rad]",
+                )
+
+
+def _check_age(age: float, most: float) -> None:
+    if age > most:
+        raise DoorError(
+            "stale", f"the newest morphing parameters are {age:.2f} s old, expected {most:g} s"
+        )
+    if age < -most:
+        raise DoorError(
+            "future",
+            f"the newest morphing parameters are {-age:.2f} s ahead of the clock; "
+            "is use_sim_time set as for their sender?",
+        )

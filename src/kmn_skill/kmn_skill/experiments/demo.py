@@ -1,0 +1,109 @@
+"""A door that no one measured is seen by a depth camera, morphed, planned for and opened."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.utilities import remove_ros_args
+
+from kmn_msgs.action import OpenDoor
+from kmn_perception.command_line.arguments import whole_number
+from kmn_perception.command_line.columns import columns
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.program import ros_session
+from kmn_skill.experiments.door_system import DoorSystem, Opened
+from kmn_skill.experiments.evaluate import NOISES, random_doors
+from kmn_skill.experiments.film_strip import save_strip
+from kmn_skill.experiments.settings import MODES, Experiment
+
+
+class Narrator:
+    """Tells the phases of a goal as they come."""
+
+    def __init__(self) -> None:
+        self._told = ""
+
+    def tell(self, feedback: OpenDoor.Feedback) -> None:
+        """Print what is being done, when it changes."""
+        if feedback.phase != self._told:
+            self._told = feedback.phase
+            print(
+                f"  {feedback.phase:6s} {100 * feedback.progress:3.0f} %   "
+                f"handle {feedback.handle_angle:5.2f} rad   door {feedback.door_angle:5.2f} rad",
+                flush=True,
+            )
+
+
+def run(options: argparse.Namespace, experiment: Experiment) -> bool:
+    """Open one random door and tell how it went; return whether it is open."""
+    model = KinematicModel.load("door")
+    values = random_doors(model, 1, options.seed)[0]
+    goal, pace = experiment.goal(options.mode), experiment.demo
+    sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
+    options.out.mkdir(parents=True, exist_ok=True)
+    film = options.out / f"door_{options.mode}_{options.seed}.gif"
+    strip = film.with_suffix(".png")
+    print("starting sim_node, morph_node and skill_node (20 seconds)", flush=True)
+    with DoorSystem(sim, "perceived", experiment.timeouts) as system:
+        system.show(values, options.mode)
+        system.film(film, experiment.film.rate)
+        print(f"opening a door (seed {options.seed}, {options.mode}):", flush=True)
+        opened = system.open(goal, Narrator().tell)
+        system.film(None, experiment.film.rate)
+    save_strip(film, strip, experiment.film.strip)
+    print(comparison(model, values, opened.perceived))
+    print(summary(opened))
+    print(f"film {film}, pictures {strip}")
+    return bool(opened.result.success) and experiment.is_open(options.mode, opened.hinge)
+
+
+def comparison(
+    model: KinematicModel, true: NDArray[np.float64], perceived: NDArray[np.float64]
+) -> str:
+    """Return a table of the true and the perceived parameters."""
+    rows = [["parameter", "true", "perceived", "error"]]
+    for parameter, *numbers in zip(
+        model.parameters, true, perceived, perceived - true, strict=True
+    ):
+        rows.append([parameter.name, *(f"{number:.4f}" for number in numbers)])
+    return columns(rows)
+
+
+def summary(opened: Opened) -> str:
+    """Return how the goal ended."""
+    result = opened.result
+    text = (
+        f"planned within {result.planning_time:.2f} s, clearance {1e3 * result.clearance:.1f} mm, "
+        f"contact error {1e3 * result.contact_error:.2f} mm, attempts {result.attempts}\n"
+        f"handle turned to {result.handle_angle:.2f} rad, door opened to {opened.hinge:.2f} rad"
+    )
+    return text if result.success else f"{text}\nthe door was not opened: {result.reason}"
+
+
+def arguments(argv: list[str]) -> argparse.Namespace:
+    """Parse the command line without its ROS arguments."""
+    parser = argparse.ArgumentParser(prog="demo", description=__doc__)
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of door and noise")
+    parser.add_argument("--mode", choices=tuple(MODES), default="pull")
+    parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
+    parser.add_argument(
+        "--out", type=Path, default=Path("outputs/door_demo"), help="folder for film and pictures"
+    )
+    return parser.parse_args(argv)
+
+
+def main() -> int:
+    """Run the executable ``demo``."""
+    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    with ros_session("demo"):
+        is_open = run(options, Experiment.load())
+    print("the door is open" if is_open else "the door is NOT open")
+    return 0 if is_open else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

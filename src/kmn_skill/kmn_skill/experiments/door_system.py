@@ -1,0 +1,233 @@
+"""The whole system in processes of its own - sim_node, morph_node, skill_node - and its client."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from copy import copy
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.action.client import ActionClient
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+from kmn_msgs.action import OpenDoor
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import Section
+from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
+from kmn_skill.execution.opening import Goal
+from kmn_skill.experiments.settings import Timeouts
+
+QUEUE_DEPTH = 10
+PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
+SOURCES = {  # of the door's parameters, and the topic that skill_node takes them from
+    "perceived": "morphing_parameters",
+    "true": "ground_truth",
+    "prototype": "prototype_parameters",
+}
+
+
+class Patience(NamedTuple):
+    """How long what is late is waited for.
+
+    Attributes
+    ----------
+    frames
+        Of a new door, after which skill_node relies on no older one.
+    skill_node
+        Parameters of skill_node, in seconds of the wall's clock.
+    """
+
+    frames: int
+    skill_node: dict[str, float]
+
+    @classmethod
+    def load(cls) -> Patience:
+        """Read ``config/skill/system.yaml``."""
+        section = Section.load(resources.find("config/skill", "system"))
+        section.allow(cls._fields)
+        parameters = section.section("skill_node")
+        return cls(
+            frames=section.whole_number("frames", 1, 1000),
+            skill_node={name: parameters.number(name, 0.0) for name in parameters.values},
+        )
+
+
+class Opened(NamedTuple):
+    """What became of a goal.
+
+    Attributes
+    ----------
+    result
+        Of the action.
+    perceived
+        The last parameters (n + m,) that skill_node could take when the goal was sent.
+    hinge
+        Angle of the door in the physics at the end, radians.
+    """
+
+    result: OpenDoor.Result
+    perceived: NDArray[np.float64]
+    hinge: float
+
+
+class DoorSystem:
+    """Starts the nodes and is a client of theirs, up to the end of a context.
+
+    Parameters
+    ----------
+    sim
+        Parameters of sim_node.
+    source
+        Where skill_node takes the door from, one of ``SOURCES``.
+    timeouts
+        How long to wait for what.
+
+    Raises
+    ------
+    ProcessError
+        If a node ends or does not answer; by all methods.
+    """
+
+    def __init__(self, sim: dict[str, Any], source: str, timeouts: Timeouts) -> None:
+        self._sim, self._source, self._timeouts = sim, source, timeouts
+        self._patience = Patience.load()
+        self._processes: list[NodeProcess] = []
+        self._stack = ExitStack()
+        self._truth: MorphingParameters | None = None
+        self._taken: list[MorphingParameters] = []
+        self._hinge = float("nan")
+
+    def __enter__(self) -> DoorSystem:
+        with ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            namespace = f"/doors_{os.getpid()}"  # whatever else runs here is not disturbed
+            remaps = [f"__ns:={namespace}", f"/clock:={namespace}/clock"]
+            for module, parameters, more in self._nodes():
+                renamed = [part for text in (*remaps, *more) for part in ("-r", text)]
+                arguments = [*renamed, *parameter_arguments(parameters)]
+                process = NodeProcess(module, arguments, folder / module)
+                self._processes.append(stack.enter_context(process))
+            self._node = Node("doors", cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
+            stack.callback(self._node.destroy_node)
+            self._client = ProcessClient(self._node, self._processes)
+            self._connect()
+            self._client.wait(self._is_ready, self._timeouts.start, "the system")
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+    def show(self, values: NDArray[np.float64], direction: str) -> None:
+        """Set up a closed door of morphing parameters (n + m,), and the robot where it starts.
+
+        Returns when skill_node knows of this door only.
+        """
+        scene = self._timeouts.scene
+        self._set(placement="given", values=[float(v) for v in values], direction=direction)
+        self._truth = None
+        truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
+        since = Time.from_msg(truth.header.stamp)
+        self._taken.clear()
+        frames = self._patience.frames
+        self._client.wait(
+            lambda: self._count_since(since) >= frames, scene, "what perceives the door"
+        )
+
+    def open(self, goal: Goal, feedback: Callable[[OpenDoor.Feedback], None]) -> Opened:
+        """Open the door that is there; ``feedback`` is told what is being done."""
+        perceived = np.array([*self._taken[-1].theta, *self._taken[-1].gamma])
+        request = OpenDoor.Goal(handle_angle=goal.handle_angle, door_angle=goal.door_angle)
+        accepted = self._action.send_goal_async(
+            request, feedback_callback=lambda message: feedback(message.feedback)
+        )
+        self._client.wait(accepted.done, self._timeouts.scene, "skill_node")
+        answer = accepted.result().get_result_async()
+        self._client.wait(answer.done, self._timeouts.goal, "skill_node")
+        return Opened(answer.result().result, perceived, self._hinge)
+
+    def film(self, file: Path | None, rate: float) -> None:
+        """Let sim_node film what follows with so many pictures a second; None ends the film."""
+        self._set(record=str(file.absolute()) if file else "", record_rate=rate)
+
+    def _nodes(self) -> list[tuple[str, dict[str, Any], list[str]]]:
+        """Return modules, parameters and remappings of the nodes that are needed."""
+        simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
+        nodes: list[tuple[str, dict[str, Any], list[str]]] = [
+            ("kmn_sim.ros.start_sim_node", {**self._sim, "publish_clock": True}, []),
+            ("kmn_skill.ros.start_skill_node", {**simulated, **self._skill_parameters()}, [door]),
+        ]
+        if self._source == "perceived":
+            morph = {**simulated, "reliability": "reliable"}
+            nodes.append(("kmn_perception.ros.start_morph_node", morph, []))
+        return nodes
+
+    def _skill_parameters(self) -> dict[str, float]:
+        """Return the parameters of skill_node in simulated seconds."""
+        pace = max(1.0, self._sim["real_time_factor"])
+        return {name: pace * value for name, value in self._patience.skill_node.items()}
+
+    def _connect(self) -> None:
+        node = self._node
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_subscription(MorphingParameters, "ground_truth", self._on_truth, latched)
+        node.create_subscription(
+            MorphingParameters, SOURCES[self._source], self._on_parameters, QUEUE_DEPTH
+        )
+        node.create_subscription(JointState, "door_state", self._on_door, QUEUE_DEPTH)
+        self._action = ActionClient(node, OpenDoor, "open_door")
+        self._setting = node.create_client(
+            SetParametersAtomically, "sim_node/set_parameters_atomically"
+        )
+        self._prototype = node.create_publisher(
+            MorphingParameters, SOURCES["prototype"], QUEUE_DEPTH
+        )
+        if self._source == "prototype":
+            node.create_timer(PROTOTYPE_PERIOD, self._publish_prototype)
+
+    def _truth_of(self, values: NDArray[np.float64]) -> MorphingParameters | None:
+        """Return the truth if it is of these parameters."""
+        truth = self._truth
+        return truth if truth and np.allclose([*truth.theta, *truth.gamma], values) else None
+
+    def _count_since(self, since: Time) -> int:
+        return sum(Time.from_msg(message.header.stamp) >= since for message in self._taken)
+
+    def _is_ready(self) -> bool:
+        return (
+            self._setting.service_is_ready()
+            and self._action.server_is_ready()
+            and self._truth is not None
+            and len(self._taken) > 0
+        )
+
+    def _on_truth(self, message: MorphingParameters) -> None:
+        self._truth = message
+
+    def _on_parameters(self, message: MorphingParameters) -> None:
+        if message.status == MorphingParameters.OK:
+            self._taken.append(message)
+
+    def _on_door(self, message: JointState) -> None:
+        self._hinge = message.position[0]
+
+    def _publish_prototype(self) -> None:
+        """Publish the prototype with the stamp of the true door."""
+        if self._truth is not None:
+            prototype = copy(self._truth)
+            prototype.theta = [0.0] * len(prototype.theta)
+            prototype.gamma = [0.0] * len(prototype.gamma)
+            self._prototype.publish(prototype)
+
+    def _set(self, **values: Any) -> None:
+        self._client.set_parameters(self._setting, values, self._timeouts.scene)

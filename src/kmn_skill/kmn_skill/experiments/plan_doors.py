@@ -1,0 +1,113 @@
+"""Plan for random doors without a simulator, and count how many plans pass the check.
+
+Run as ``python -m kmn_skill.experiments.plan_doors --mode pull --doors 100``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.columns import columns
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.experiments.make_prototypes import HOME
+from kmn_skill.experiments.settings import MODES, Experiment
+from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
+from kmn_skill.planning.planner import Planner
+
+
+class Planned(NamedTuple):
+    """A door's morphing parameters (n + m,), the report of its plan, and why there is none."""
+
+    values: NDArray[np.float64]
+    report: PlanReport | None
+    reason: str
+
+
+def opening(values: NDArray[np.float64], mode: str) -> PlanRequest:
+    """Return the request to open a closed door of parameters (n + m,) from the robot's home."""
+    theta, gamma = KinematicModel.load("door").split(values)
+    goal = Experiment.load().goal(mode)
+    return PlanRequest(
+        theta, gamma, np.array(HOME), np.zeros(2), goal.handle_angle, goal.door_angle
+    )
+
+
+def plan_doors(planner: Planner, doors: NDArray[np.float64], mode: str) -> list[Planned]:
+    """Plan for doors (D, n + m), one after the other."""
+    planned = []
+    with tqdm(doors, unit="door") as bar:
+        for values in bar:
+            try:
+                report = planner.plan(opening(values, mode)).report
+                planned.append(Planned(values, report, ""))
+            except PlanningFailed as error:
+                planned.append(Planned(values, None, str(error)))
+            bar.set_postfix_str(f"{sum(door.report is not None for door in planned)} planned")
+    return planned
+
+
+def tally(doors: Sequence[Planned]) -> dict[str, Any]:
+    """Return counts and figures as they are written to JSON."""
+    reports = [door.report for door in doors if door.report is not None]
+    result: dict[str, Any] = {"doors": len(doors), "planned": len(reports)}
+    if reports:
+        times = [report.planning_time for report in reports]
+        result["planning_s"] = {
+            "median": float(np.median(times)),
+            "p95": float(np.percentile(times, 95.0)),
+        }
+        result["contact_error_m"] = {"max": max(report.contact_error for report in reports)}
+        result["clearance_m"] = {"min": min(report.clearance for report in reports)}
+        result["varied"] = sum("varied" in report.seed_used for report in reports)
+    result["failures"] = [
+        {"door": number, "values": door.values.tolist(), "reason": door.reason}
+        for number, door in enumerate(doors)
+        if door.report is None
+    ]
+    return result
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return the figures for people to read."""
+    rows = [["planned", f"{result['planned']} of {result['doors']}"]]
+    if result["planned"]:
+        rows += [
+            ["after the first guess failed", str(result["varied"])],
+            ["planning median", f"{result['planning_s']['median']:.2f} s"],
+            ["planning p95", f"{result['planning_s']['p95']:.2f} s"],
+            ["contact error max", f"{1e3 * result['contact_error_m']['max']:.2f} mm"],
+            ["clearance min", f"{1e3 * result['clearance_m']['min']:.1f} mm"],
+        ]
+    reasons = [f"door {failure['door']}: {failure['reason']}" for failure in result["failures"]]
+    return "\n".join([columns(rows), *reasons])
+
+
+def main() -> int:
+    """Run the command."""
+    parser = argparse.ArgumentParser(prog="plan_doors", description=__doc__)
+    parser.add_argument("--doors", type=whole_number(1), default=100, help="default 100")
+    parser.add_argument("--mode", choices=tuple(MODES), default="pull")
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of the doors")
+    parser.add_argument("--json", type=output_file, help="file to write the result to")
+    options = parser.parse_args()
+    generator = np.random.default_rng(options.seed)
+    doors = KinematicModel.load("door").sample(generator, options.doors)
+    with Planner() as planner:
+        result = tally(plan_doors(planner, doors, options.mode))
+    print(table(result))
+    if options.json:
+        named = {"mode": options.mode, "seed": options.seed}
+        write_json(options.json, {**named, **result})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

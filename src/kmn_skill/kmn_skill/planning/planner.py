@@ -1,0 +1,157 @@
+"""Plans in a process of its own: it may hang or die without harm to who asks."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+
+from kmn_skill.planning import prototypes
+from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
+from kmn_skill.planning.planning_process import READY, serve
+from kmn_skill.planning.settings import SkillSettings
+
+POLL_PERIOD = 0.02  # seconds
+STOP_TIMEOUT = 2.0  # seconds for the process to end
+
+
+class Planner:
+    """Plans one request at a time; to be used as a context, which owns the process.
+
+    Attributes
+    ----------
+    restarts
+        How often the process had to be started anew.
+    """
+
+    def __init__(self, settings: SkillSettings | None = None) -> None:
+        self._settings = (settings or SkillSettings.load()).planner
+        self._process: BaseProcess | None = None
+        self._connection: Connection | None = None
+        self._loaded = False
+        self.restarts = 0
+
+    def __enter__(self) -> Planner:
+        self._start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stop()
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process."""
+        return None if self._process is None else self._process.pid
+
+    def plan(self, request: PlanRequest, cancelled: Callable[[], bool] = lambda: False) -> Plan:
+        """Return a plan that has passed the check.
+
+        Parameters
+        ----------
+        cancelled
+            Is asked again and again whether the plan is still wanted.
+
+        Raises
+        ------
+        PlanningFailed
+            If there is none within the time limit.
+        PlanningCancelled
+            If it is not wanted any more.
+        """
+        if not request.is_finite():
+            raise PlanningFailed("the request has numbers that are not finite")
+        begin, left = time.monotonic(), self._settings.time_limit
+        reasons = []
+        for guess in prototypes.guesses(
+            request.door_angle, self._settings.attempts, self._settings.spread
+        ):
+            if left <= 0.0:
+                reasons.append(f"the {self._settings.time_limit:g} s are over")
+                break
+            connection = self._ready(cancelled)
+            attempted = time.monotonic()
+            limit = min(left, self._settings.attempt_limit)
+            answer = self._attempt(connection, request, guess, limit, cancelled)
+            left -= time.monotonic() - attempted
+            if isinstance(answer, Plan):
+                passed = time.monotonic() - begin
+                return replace(answer, report=replace(answer.report, planning_time=passed))
+            reasons.append(answer)
+        raise PlanningFailed("; ".join(dict.fromkeys(reasons)))
+
+    def _ready(self, cancelled: Callable[[], bool]) -> Connection:
+        """Return the connection to a process that has loaded all it needs.
+
+        That takes seconds, and is no part of a plan's time.
+
+        Raises
+        ------
+        PlanningFailed
+            If the process does not start.
+        PlanningCancelled
+            If the plan is not wanted any more.
+        """
+        if self._process is None or not self._process.is_alive():
+            self._restart()
+        assert self._connection is not None
+        deadline = time.monotonic() + self._settings.start_limit
+        while not self._loaded:
+            if cancelled():
+                raise PlanningCancelled
+            if time.monotonic() > deadline:
+                raise PlanningFailed("the planner's process does not start")
+            try:
+                if self._connection.poll(POLL_PERIOD):
+                    self._loaded = self._connection.recv() == READY
+            except (EOFError, OSError):
+                raise PlanningFailed("the planner's process died while it started") from None
+        return self._connection
+
+    def _attempt(
+        self,
+        connection: Connection,
+        request: PlanRequest,
+        guess: prototypes.Prototype,
+        limit: float,
+        cancelled: Callable[[], bool],
+    ) -> Plan | str:
+        """Return the plan that a first guess leads to, or why there is none."""
+        deadline = time.monotonic() + limit
+        try:
+            connection.send((request, guess))
+            while not connection.poll(POLL_PERIOD):
+                if cancelled():
+                    self._restart()
+                    raise PlanningCancelled
+                if time.monotonic() > deadline:
+                    self._restart()
+                    return f"the solver took longer than {limit:.1f} s"
+            answer: Plan | str = connection.recv()
+        except (EOFError, OSError):
+            self._restart()
+            return "the planner's process died"
+        return answer
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, other = context.Pipe()
+        self._process = context.Process(target=serve, args=(other,), name="planner", daemon=True)
+        self._process.start()
+        self._loaded = False
+        other.close()
+
+    def _restart(self) -> None:
+        self._stop()
+        self._start()
+        self.restarts += 1
+
+    def _stop(self) -> None:
+        if self._process is None or self._connection is None:
+            return
+        self._connection.close()
+        self._process.kill()
+        self._process.join(STOP_TIMEOUT)
+        self._process = self._connection = None

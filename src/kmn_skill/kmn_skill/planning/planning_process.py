@@ -1,0 +1,46 @@
+"""What runs in the planner's process: it answers requests with plans or reasons."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+from multiprocessing.connection import Connection
+
+READY = "ready"  # is sent when all is loaded
+
+
+def serve(connection: Connection) -> None:
+    """Say when ready, then answer each (request, guess) with a plan, or why there is none."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)  # the package robotic writes a log where it is
+        _silence()
+        _answer(connection)
+
+
+def _answer(connection: Connection) -> None:
+    from kmn_skill.planning.check import PlanRejected
+    from kmn_skill.planning.solver import Solver
+
+    solver = Solver()
+    connection.send(READY)
+    while True:
+        try:
+            request, guess = connection.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            connection.send(solver.plan(request, guess.path, guess.name))
+        except PlanRejected as error:
+            connection.send(str(error))
+        except RuntimeError as error:  # what the package robotic raises
+            connection.send(f"the solver failed: {str(error).splitlines()[0]}")
+
+
+def _silence() -> None:
+    """Discard what the solver writes to the terminal."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
+    os.close(nowhere)

@@ -1,0 +1,174 @@
+"""The policy: a constrained trajectory optimisation problem on the kinematic model (Sec. III-D).
+
+Time runs from 0 to 4: at 1 the gripper is before the handle, at 2 about it, at 3 the handle is
+pressed, at 4 the door is open. One step after 2 the gripper closes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import robotic as ry
+from numpy.typing import ArrayLike, NDArray
+
+from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.settings import PolicySettings
+from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, door_body
+
+PHASES = 4
+COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
+
+
+class Pair(NamedTuple):
+    """Two bodies that shall not touch between two times."""
+
+    first: str
+    second: str
+    begin: float
+    end: float
+
+
+class Policy:
+    """The policy for a request.
+
+    Parameters
+    ----------
+    world
+        The kinematic model with the robot.
+    slices
+        Configurations a phase; T is four times this.
+    pairs
+        What shall not touch.
+
+    Attributes
+    ----------
+    problem
+        The optimisation problem, of the package robotic.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        robot: Robot,
+        request: PlanRequest,
+        settings: PolicySettings,
+        slices: int,
+        pairs: Iterable[Pair],
+    ) -> None:
+        self._world, self._robot, self._settings = world, robot, settings
+        world.configuration.setJointState([*request.start, *request.door_start])
+        self.problem: Any = ry.KOMO(world.configuration, PHASES, slices, 2, False)
+        self._step = 1.0 / slices
+        self._add_costs(request)
+        self._add_equalities(request)
+        self._add_inequalities(pairs)
+
+    def _add_costs(self, request: PlanRequest) -> None:
+        """Smooth motion, base pose before the door, pre-grasp pose of the gripper."""
+        robot, settings, step = self._robot, self._settings, self._step
+        arm = [*robot.model_joints[:-1], *self._world.model_joints[-2:]]
+        rate = np.sqrt(step)  # the sum over the steps is an integral over time
+        self._add("acceleration", [], ry.FS.qItself, arm, COST, scale=rate, order=2)
+        gripper = [robot.gripper]
+        self._add("acceleration", [step, 1.0], ry.FS.qItself, gripper, COST, scale=rate, order=2)
+
+        base = [robot.base, GRASP]
+        along = np.eye(3)[:2]
+        self._add("base", [2.0], ry.FS.positionRel, base, COST, [*settings.base, 0.0], along)
+        self._add("base", [2.0], ry.FS.scalarProductXY, [robot.base, OBJECT], COST)
+
+        tool, before = [TOOL, GRASP], [settings.pre_grasp, 0.0, 0.0]
+        self._add("pre_grasp", [1.0], ry.FS.positionRel, tool, COST, before)
+        self._add("end", [4.0], ry.FS.qItself, arm, COST, order=1)
+        self._add("heading", [1.0, 2.0], ry.FS.scalarProductXX, tool, COST, [1.0])
+
+    def _add_equalities(self, request: PlanRequest) -> None:
+        """Targets of handle and door, contact, and what is fixed when."""
+        robot, step = self._robot, self._step
+        hinge, handle = ([name] for name in self._world.model_joints[-2:])
+        gripper, others = [robot.gripper], list(robot.model_joints[:-1])
+        hinge_start, handle_start = request.door_start
+
+        self._add("target", [3.0], ry.FS.qItself, handle, EQUAL, [request.handle_angle])
+        self._add("target", [4.0], ry.FS.qItself, hinge, EQUAL, [request.door_angle])
+
+        for pad, contact in zip(PADS, CONTACTS, strict=True):
+            times = [2.0 + step, 4.0]
+            self._add("contact", times, ry.FS.positionDiff, [pad, contact], EQUAL)
+
+        self._add("fixed", [step, 3.0], ry.FS.qItself, hinge, EQUAL, [hinge_start])
+        self._add("fixed", [step, 2.0 + step], ry.FS.qItself, handle, EQUAL, [handle_start])
+        self._add("fixed", [3.0 + step, 4.0], ry.FS.qItself, handle, EQUAL, [request.handle_angle])
+        opened = [self._settings.open_gripper]
+        self._add("fixed", [1.0, 2.0], ry.FS.qItself, gripper, EQUAL, opened)
+        self._add("rest", [2.0 + step], ry.FS.qItself, others, EQUAL, order=1)
+
+        # Straight towards the handle, with one finger above and one below it.
+        times, tool = [1.0, 2.0 - step], [TOOL, GRASP]
+        self._add("approach", times, ry.FS.positionRel, tool, EQUAL, [0.0] * 3, np.eye(3)[1:])
+        self._add("approach", times, ry.FS.scalarProductYX, tool, EQUAL)
+        self._add("approach", times, ry.FS.scalarProductYY, tool, EQUAL)
+
+    def _add_inequalities(self, pairs: Iterable[Pair]) -> None:
+        """Limits of the joints, and collisions."""
+        self._add("limits", [], ry.FS.jointLimits, [], INEQUALITY)
+        margin = [-self._settings.margin]
+        for first, second, begin, end in pairs:
+            bodies, times = [first, second], [max(begin, self._step), end]
+            self._add("collision", times, ry.FS.negDistance, bodies, INEQUALITY, margin)
+
+    def _add(
+        self,
+        weight: str,
+        times: list[float],
+        feature: Any,
+        frames: list[str],
+        kind: Any,
+        target: list[float] | None = None,
+        scale: ArrayLike = 1.0,
+        order: int = 0,
+    ) -> None:
+        """Add a feature over times; `kind` is a cost, an equality or an inequality."""
+        scale = self._settings.weights[weight] * np.atleast_1d(np.asarray(scale))
+        self.problem.addObjective(times, feature, frames, kind, scale, target or [], order)
+
+
+def pairs(settings: PolicySettings, world: World) -> list[Pair]:
+    """Return all pairs of bodies that shall not touch."""
+    panel, handle = (door_body(name) for name in world.door_bodies)
+    door = [(body, panel) for body in settings.door_collisions]
+    door += [(body, handle) for body in settings.handle_collisions]
+    own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
+    always = [Pair(*names, 0.0, float(PHASES)) for names in (*door, *own)]
+    return always + [Pair(body, handle, 0.0, 1.0) for body in settings.approach_collisions]
+
+
+def near_pairs(
+    world: World, pairs: Iterable[Pair], path: NDArray[np.float64], near: float
+) -> list[Pair]:
+    """Return the pairs that come near each other on a coarse path, and when.
+
+    Parameters
+    ----------
+    path
+        (T, 13) positions of the dofs, equally spaced over the time.
+    near
+        Metres.
+    """
+    pairs = list(pairs)
+    distances = np.empty((len(path), len(pairs)))
+    for row, positions in zip(distances, path, strict=True):
+        world.configuration.setJointState(positions)
+        row[:] = [-world.configuration.eval(ry.FS.negDistance, pair[:2])[0][0] for pair in pairs]
+    step = PHASES / len(path)
+    kept = []
+    for pair, distance in zip(pairs, distances.T, strict=True):
+        close = np.flatnonzero(distance < near)
+        if len(close):
+            begin, end = max(close[0] * step, pair.begin), min((close[-1] + 2) * step, pair.end)
+            if begin < end:
+                kept.append(pair._replace(begin=begin, end=end))
+    return kept

@@ -1,0 +1,117 @@
+"""Transfer of the prototype's solution to a door, as the first guess of the policy's solution."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.transformation import rotation_z
+from kmn_skill.planning.kinematics import turn
+from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.policy import PHASES
+
+
+def transfer(
+    path: NDArray[np.float64], model: KinematicModel, request: PlanRequest
+) -> NDArray[np.float64]:
+    """Return a path (T, 13) for a door, made from the prototype's.
+
+    The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
+    shall turn by other angles than the prototype, or is ajar, the base also turns with it about
+    its hinge. What then parts the path from the present state fades out up to the pre-grasp pose.
+
+    Parameters
+    ----------
+    path
+        (T + 1, 13) of the prototype, with the start.
+    """
+    guess = path.copy()
+    guess[:, 11] = _stretched(path[:, 11], request.door_start[0], request.door_angle)
+    guess[:, 12] = _stretched(path[:, 12], request.door_start[1], request.handle_angle)
+    prototype = np.zeros_like(request.gamma)
+    pose = model.transformation.matrix(request.theta)
+    hinge, handle = model.joints
+    shift = np.eye(4)
+    shift[:3, 3] = handle.origin(request.gamma) - handle.origin(prototype)
+    for before, after in zip(path, guess, strict=True):
+        closing = np.linalg.inv(turn(hinge, prototype, before[11]))
+        opening = turn(hinge, request.gamma, after[11])
+        after[:3] = move_base(before[:3], pose @ opening @ shift @ closing)
+    phase = (len(path) - 1) // PHASES
+    fading = np.clip(1.0 - np.arange(len(path)) / phase, 0.0, 1.0)[:, None]
+    guess[:, :11] += fading**2 * (3.0 - 2.0 * fading) * (request.start - guess[0, :11])
+    return guess[1:]
+
+
+def move_base(base: NDArray[np.float64], motion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Move x, y and yaw (..., 3) by a motion (4, 4) in the plane."""
+    yaw = np.arctan2(motion[1, 0], motion[0, 0])
+    place = base[..., :2] @ rotation_z(yaw)[:2, :2].T + motion[:2, 3]
+    return np.concatenate([place, base[..., 2:] + yaw], axis=-1)
+
+
+def refine(
+    path: NDArray[np.float64], start: NDArray[np.float64], slices: int
+) -> NDArray[np.float64]:
+    """Interpolate a coarse path to more configurations a phase.
+
+    At the time 2 only the gripper moves, in one step, on either path.
+
+    Parameters
+    ----------
+    path
+        (T, 13) with ``T / 4`` configurations a phase.
+    start
+        (13,) configuration before the first one.
+    slices
+        Configurations a phase of the result.
+    """
+    coarse = len(path) // PHASES
+    nodes = np.vstack([start, path])
+    reach = _resampled(nodes[: 2 * coarse + 1], 2 * slices + 1)[1:]
+    press = _resampled(nodes[2 * coarse + 1 : 3 * coarse + 1], slices)
+    opening = _resampled(nodes[3 * coarse :], slices + 1)[1:]
+    return np.concatenate([reach, press, opening])
+
+
+def hermite(
+    nodes: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    times: NDArray[np.float64],
+    at: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the cubic spline (N, D) through nodes (M, D), as the robot's controller has it.
+
+    Parameters
+    ----------
+    velocities
+        (M, D) at the nodes.
+    times
+        (M,) of the nodes.
+    at
+        (N,) times within.
+    """
+    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    duration = (times[i + 1] - times[i])[:, None]
+    s = (at - times[i])[:, None] / duration
+    return (
+        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * nodes[i]
+        + s * (1.0 - s) ** 2 * duration * velocities[i]
+        + s**2 * (3.0 - 2.0 * s) * nodes[i + 1]
+        - s**2 * (1.0 - s) * duration * velocities[i + 1]
+    )
+
+
+def _stretched(angles: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    """Let angles that run from 0 to their last value run between other values."""
+    return start + angles / angles[-1] * (end - start)
+
+
+def _resampled(nodes: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return ``count`` configurations on the curve from rest to rest through nodes (M, D)."""
+    velocities: NDArray[np.float64] = np.gradient(nodes, axis=0)
+    velocities[[0, -1]] = 0.0
+    times = np.arange(len(nodes), dtype=np.float64)
+    at = np.linspace(0.0, len(nodes) - 1.0, count, dtype=np.float64)
+    return hermite(nodes, velocities, times, at)

@@ -1,0 +1,4 @@
+"""skill_node: the action, its messages and parameters.
+
+Imports ``execution`` and ``planning``; ``experiments`` stands on top of it.
+"""

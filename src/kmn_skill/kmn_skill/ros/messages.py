@@ -1,0 +1,146 @@
+"""Conversions between ROS messages and what the skill works with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Duration as DurationMessage
+from builtin_interfaces.msg import Time as TimeMessage
+from geometry_msgs.msg import Point
+from numpy.typing import NDArray
+from rclpy.duration import Duration
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA, Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import Marker, MarkerArray
+
+from kmn_msgs.action import OpenDoor
+from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.messages import MessageError, cube_marker
+from kmn_skill.execution.opening import SUCCESS, Result
+from kmn_skill.execution.perceived_door import Observation
+from kmn_skill.execution.plan_execution import Part
+from kmn_skill.execution.states import Sample
+from kmn_skill.planning.kinematics import moved_cubes
+from kmn_skill.planning.plan import Plan
+
+NANO = 1e-9
+PATH_WIDTH = 0.02  # metres
+BASE_COLOUR = ColorRGBA(r=0.36, g=0.61, b=0.94, a=1.0)
+HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
+DOOR_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=0.3)
+
+
+def seconds(stamp: TimeMessage) -> float:
+    """Return a stamp in seconds."""
+    return float(NANO * Time.from_msg(stamp).nanoseconds)
+
+
+def stamp_of(time: float) -> TimeMessage:
+    """Return the stamp of a time in seconds."""
+    return Time(nanoseconds=round(time / NANO)).to_msg()
+
+
+def observation_from_message(message: MorphingParameters) -> Observation:
+    """Read morphing parameters, be they valid or not."""
+    values = np.array([*message.theta, *message.gamma], dtype=np.float64)
+    covariance = np.array(message.covariance, dtype=np.float64)
+    if covariance.size == values.size**2:
+        covariance = covariance.reshape(values.size, values.size)
+    valid = message.status == MorphingParameters.OK
+    return Observation(
+        time=seconds(message.header.stamp),
+        model=message.model,
+        frame=message.header.frame_id,
+        names=(*message.theta_names, *message.gamma_names),
+        values=values,
+        covariance=covariance,
+        problem="" if valid else message.reason or f"status is {message.status}, expected OK",
+    )
+
+
+def sample_from_state(message: JointState, names: Sequence[str]) -> Sample:
+    """Read the positions of some joints.
+
+    Raises
+    ------
+    MessageError
+        If one is missing or not finite.
+    """
+    if len(message.name) != len(message.position):
+        raise MessageError(
+            "lengths", f"found {len(message.position)} positions of {len(message.name)} joints"
+        )
+    places = dict(zip(message.name, message.position, strict=True))
+    if missing := [name for name in names if name not in places]:
+        raise MessageError("missing_joints", f"the state lacks the joints {', '.join(missing)}")
+    positions = np.array([places[name] for name in names])
+    if not np.isfinite(positions).all():
+        raise MessageError("not_finite", f"positions are not finite: {positions.tolist()}")
+    return Sample(seconds(message.header.stamp), positions)
+
+
+def trajectory_from_part(part: Part, names: Sequence[str]) -> JointTrajectory:
+    """Make the message of a part of a plan."""
+    points = [
+        JointTrajectoryPoint(
+            positions=positions.tolist(),
+            velocities=velocities.tolist(),
+            time_from_start=_duration(float(time)),
+        )
+        for time, positions, velocities in zip(*part[1:], strict=True)
+    ]
+    return JointTrajectory(
+        header=Header(stamp=stamp_of(part.start)), joint_names=list(names), points=points
+    )
+
+
+def result_message(result: Result) -> OpenDoor.Result:
+    """Make the message of a goal's result."""
+    report = result.report
+    return OpenDoor.Result(
+        success=result.outcome == SUCCESS,
+        reason=result.reason,
+        handle_angle=result.handle_angle,
+        door_angle=result.door_angle,
+        planning_time=report.planning_time if report else math.nan,
+        contact_error=report.contact_error if report else math.nan,
+        clearance=report.clearance if report else math.nan,
+        attempts=result.attempts,
+    )
+
+
+def markers_from_plan(
+    plan: Plan, model: KinematicModel, values: NDArray[np.float64], header: Header
+) -> MarkerArray:
+    """Draw the paths of base and handle as lines, and the door as it will stand."""
+    base = np.column_stack([plan.positions[:, :2], np.zeros(len(plan.times))])
+    handle = [body.name for body in model.bodies].index(model.joints[1].body)
+    cubes = [moved_cubes(model, values, angles) for angles in plan.door]
+    levers = np.array([each[handle][:3, 3] for each in cubes])
+    markers = [
+        Marker(header=header, action=Marker.DELETEALL),
+        _line(header, "base", base, BASE_COLOUR),
+        _line(header, "handle", levers, HANDLE_COLOUR),
+    ]
+    for number, cube in enumerate(cubes[-1]):
+        markers.append(cube_marker("door", number, cube, DOOR_COLOUR, header))
+    return MarkerArray(markers=markers)
+
+
+def _line(header: Header, name: str, points: NDArray[np.float64], colour: ColorRGBA) -> Marker:
+    """Draw a line through points (N, 3)."""
+    marker = Marker(header=header, ns=name, type=Marker.LINE_STRIP, action=Marker.ADD)
+    marker.pose.orientation.w = 1.0
+    marker.scale.x = PATH_WIDTH
+    marker.color = colour
+    marker.points = [Point(x=x, y=y, z=z) for x, y, z in points.tolist()]
+    return marker
+
+
+def _duration(time: float) -> DurationMessage:
+    return Duration(nanoseconds=round(time / NANO)).to_msg()

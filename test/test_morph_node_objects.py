@@ -74,7 +74,7 @@ def test_every_carton_has_a_message_a_marker_and_a_number_that_stays(
         answers = ask_all(client, message, count)
         assert len(answers) == count
         assert {a.status for a in answers} == {MorphingParameters.OK}
-        assert not any(a.cut for a in answers)
+        assert not any(a.truncated for a in answers)
         places.append({a.id: a.theta[:2] for a in answers})
         markers = [m for m in client.overlay(message.header.stamp) if m.action == Marker.ADD]
         drawn = [(m.pose.position.x, m.pose.position.y) for m in markers]
@@ -111,7 +111,7 @@ def test_an_object_at_the_border_is_called_cut(client: Any) -> None:
     points = depth_to_points(FRAMES[0], CAMERA)[:, :middle]
     answers = ask_all(client, cloud_from_points(np.ascontiguousarray(points), header), 2)
     nearest = min(answers, key=lambda a: a.theta[1])
-    assert nearest.cut
+    assert nearest.truncated
     covariance = np.reshape(nearest.covariance, (6, 6))
     assert 0.2 * np.sqrt(np.diag(covariance))[3:].max() > 0.02  # metres; how long is not seen
 

@@ -27,7 +27,7 @@ FIELDS = {
         "header": "std_msgs/Header",
         "model": "string",
         "id": "uint32",
-        "cut": "boolean",
+        "truncated": "boolean",
         "theta_names": "sequence<string>",
         "theta": "sequence<double>",
         "gamma_names": "sequence<string>",
@@ -69,7 +69,7 @@ values = st.fixed_dictionaries(
     {
         "model": text,
         "id": uint32,
-        "cut": st.booleans(),
+        "truncated": st.booleans(),
         "theta_names": st.lists(text, max_size=4),
         "theta": numbers,
         "gamma_names": st.lists(text, max_size=4),

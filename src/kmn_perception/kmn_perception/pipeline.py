@@ -72,13 +72,13 @@ class ObjectView(NamedTuple):
         Its points, and what is known around them.
     mask
         (height, width), or (N,) for unorganised points: which ones they are.
-    cut
+    truncated
         The object goes on where nothing is seen: beyond the image's border.
     """
 
     observation: Observation
     mask: NDArray[np.bool_]
-    cut: bool
+    truncated: bool
 
 
 class ObjectEstimate(NamedTuple):
@@ -87,7 +87,7 @@ class ObjectEstimate(NamedTuple):
     estimate: Estimate
     observation: Observation
     mask: NDArray[np.bool_]
-    cut: bool
+    truncated: bool
 
 
 class MorphPipeline:
@@ -190,8 +190,8 @@ class MorphPipeline:
         for label in np.argsort(too_small, kind="stable")[:most]:
             seen, mask = segments.of_object(label), labels == label
             if camera is not None:
-                cut = is_truncated(mask, around.free_depth)
-                views.append(ObjectView(Observation(seen, camera, floor, around), mask, cut))
+                truncated = is_truncated(mask, around.free_depth)
+                views.append(ObjectView(Observation(seen, camera, floor, around), mask, truncated))
             else:
                 sensor = self._canonical_view(seen, pose)
                 beside = free_space_of_cloud(segments.points, sensor, floor)
@@ -252,7 +252,7 @@ class MorphPipeline:
         observation = replace(a.observation, points=np.concatenate(parts))
         if self.estimator.estimate(observation).status is not Status.OK:
             return None
-        return ObjectView(observation, a.mask | b.mask, a.cut or b.cut)
+        return ObjectView(observation, a.mask | b.mask, a.truncated or b.truncated)
 
     def _unless_stacked(
         self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]

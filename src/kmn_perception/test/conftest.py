@@ -15,7 +15,7 @@ from kmn_perception.estimator import MorphEstimator
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.ros.morph_node_parameters import NodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 
 
 class RealFrame(NamedTuple):
@@ -44,7 +44,7 @@ def tabletop_pipeline() -> MorphPipeline:
     for name in ("morph_node", "morph_node_tabletop"):
         file = yaml.safe_load(resources.find("config/nodes", name).read_text())
         values.update(file["/**"]["ros__parameters"])
-    settings = NodeSettings.check(values)
+    settings = MorphNodeSettings.check(values)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     return MorphPipeline(estimator, settings.pipeline)
 

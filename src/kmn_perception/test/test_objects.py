@@ -63,7 +63,7 @@ def test_every_carton_of_a_real_frame_is_found_and_nothing_else(real_frame: Real
     owners = []
     for one in found:
         assert one.estimate.status is Status.OK, one.estimate.reason
-        assert not one.cut
+        assert not one.truncated
         counts = np.bincount(labels[one.mask], minlength=41)
         owner = int(counts.argmax())
         assert counts[owner] > 0.99 * one.mask.sum()
@@ -157,7 +157,7 @@ def test_two_objects_behind_another_one_stay_two(other: Box) -> None:
 )
 def test_a_box_cut_by_the_border_says_so_and_is_open_there(box: Box) -> None:
     (found,) = see(box)
-    assert found.cut
+    assert found.truncated
     spread = 0.2 * np.sqrt(np.diag(found.estimate.covariance))[3:5]
     sides = 0.2 * (1.0 + found.estimate.theta[3:5])
     assert spread.max() > 0.02 > 0.004 > spread.min()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
 from kmn_perception.refinement.geometry import shape_of, unit_cubes_jacobian
-from kmn_perception.refinement.view import projection, raycast_any, view_of
+from kmn_perception.refinement.view import model_view, projection, raycast_any
 
 Vector = NDArray[np.float64]
 
@@ -88,12 +88,12 @@ def test_unit_cubes_move_as_finite_differences_say(
 @given(shares)
 def test_planes_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
     values, shape, matrix = within(model, share), shape_of(model), projection(model.camera)
-    view = view_of(shape, values, matrix)
+    view = model_view(shape, values, matrix)
     offsets = np.linalg.norm(view.solids[:, 4:22].reshape(-1, 6, 3)[..., :2], axis=-1)
     seen_well = offsets < 0.1  # a face that is seen exactly from the side has no slope
 
     def planes(v: Vector) -> Vector:
-        return view_of(shape, v, matrix).solids[:, 4:22].reshape(-1, 6, 3)
+        return model_view(shape, v, matrix).solids[:, 4:22].reshape(-1, 6, 3)
 
     expected = slope(planes, values, 1e-7)
     scale = 1.0 + np.abs(expected)
@@ -105,12 +105,12 @@ def test_planes_move_as_finite_differences_say(model: KinematicModel, share: lis
 @given(shares)
 def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
     values, shape, matrix = within(model, share), shape_of(model), projection(model.camera)
-    view = view_of(shape, values, matrix)
+    view = model_view(shape, values, matrix)
     shown = view.faces >= 0
 
     def distances(v: Vector) -> Vector:
         """Return the distances of the edges' ends, as they are at ``values``, to the edges at v."""
-        lines = view_of(shape, v, matrix).lines
+        lines = model_view(shape, v, matrix).lines
         ends = np.stack([view.ends[..., :2], view.ends[..., 2:]], axis=2)
         ends = np.concatenate([ends, np.ones_like(ends[..., :1])], axis=-1)
         return np.einsum("beki,bei->bek", ends, lines)
@@ -128,7 +128,7 @@ def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list
 def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[float]) -> None:
     values, camera = within(model, share), model.camera.resized(64, 48)
     depth = render(model.unit_cubes(*model.split(values)), camera)
-    view = view_of(shape_of(model), values, projection(camera))
+    view = model_view(shape_of(model), values, projection(camera))
     met = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
     np.testing.assert_array_equal(met > 0.0, np.isfinite(depth))
     np.testing.assert_allclose(1.0 / met[met > 0.0], depth[met > 0.0], rtol=1e-5)
@@ -137,7 +137,7 @@ def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[flo
 def test_a_box_seen_from_above_has_the_silhouette_of_its_outline() -> None:
     """The camera of the boxes sees the front and the top of a box that stands before it."""
     box = KinematicModel.load("box_b")
-    view = view_of(shape_of(box), np.zeros(3), projection(box.camera))
+    view = model_view(shape_of(box), np.zeros(3), projection(box.camera))
     assert (view.faces[0] >= 0).sum() == 6
     corners = (
         box.unit_cubes([0, 0, 0], [])[0]

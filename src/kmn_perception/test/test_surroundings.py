@@ -69,7 +69,7 @@ def test_a_narrow_gap_at_the_border_is_unknown(length: int, known: float) -> Non
 def test_what_was_not_measured_is_presumed() -> None:
     points = row((0.7, HIGH, 1), (NONE, HIGH, 2))
     around = free_space(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
-    np.testing.assert_array_equal(around.presumed, [[False, True, True]])
+    np.testing.assert_array_equal(around.interpolated, [[False, True, True]])
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.perceived_door import (
-    DoorSettings,
-    Observation,
+    AcceptanceSettings,
+    DoorObservation,
     PerceivedDoor,
     grasp_deviations,
     grasp_quantities,
@@ -24,7 +24,7 @@ from kmn_skill.planning.kinematics import moved_cubes
 MODEL = KinematicModel.load("door")
 NAMES = tuple(parameter.name for parameter in MODEL.parameters)
 VALUES = np.array([0.1, -0.2, 0.3, 0.05, -0.1, 0.01, 0.02])
-SETTINGS = DoorSettings(
+SETTINGS = AcceptanceSettings(
     max_age=1.0,
     frames=3,
     max_distance=0.02,
@@ -37,12 +37,12 @@ SETTINGS = DoorSettings(
 )
 
 
-def seen(time: float, values: NDArray[np.float64] = VALUES, **changes: Any) -> Observation:
+def seen(time: float, values: NDArray[np.float64] = VALUES, **changes: Any) -> DoorObservation:
     covariance = 1e-6 * np.eye(len(values))
-    return Observation(time, "door", "world", NAMES, values, covariance, "")._replace(**changes)
+    return DoorObservation(time, "door", "world", NAMES, values, covariance, "")._replace(**changes)
 
 
-def door(*observations: Observation, **settings: Any) -> PerceivedDoor:
+def door(*observations: DoorObservation, **settings: Any) -> PerceivedDoor:
     made = PerceivedDoor(MODEL, "world", replace(SETTINGS, **settings))
     for observation in observations:
         made.add(observation)

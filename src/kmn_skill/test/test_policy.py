@@ -13,12 +13,12 @@ from kmn_skill.experiments.make_prototypes import HOME
 from kmn_skill.planning import prototypes
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.transfer import hermite, move_base, refine, transfer
 from kmn_skill.planning.world import World
 
-MODEL, ROBOT, SETTINGS = KinematicModel.load("door"), Robot.load(), SkillSettings.load()
+MODEL, ROBOT, SETTINGS = KinematicModel.load("door"), RobotModel.load(), SkillSettings.load()
 THETA = np.array([0.4, -0.6, 0.8])
 ZERO = np.zeros(3), np.zeros(4)
 START = np.array([*HOME, 0.0, 0.0])

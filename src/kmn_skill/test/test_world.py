@@ -9,7 +9,7 @@ import robotic as ry
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.clearance import Box, Surface, box_distance, clearance, sample_surface
 from kmn_skill.planning.kinematics import moved_cubes
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.world import PADS, TOOL, World, boxes, door_body, surfaces
 
@@ -23,7 +23,7 @@ def model() -> KinematicModel:
 
 @pytest.fixture(scope="module")
 def world(model: KinematicModel) -> World:
-    return World(model, *model.split(VALUES), Robot.load(), SkillSettings.load().grasp)
+    return World(model, *model.split(VALUES), RobotModel.load(), SkillSettings.load().grasp)
 
 
 def test_the_joints_are_those_of_joint_states_and_of_the_door(world: World) -> None:
@@ -34,7 +34,7 @@ def test_the_joints_are_those_of_joint_states_and_of_the_door(world: World) -> N
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_robot_moves_as_in_the_full_model(world: World, seed: int) -> None:
-    robot = Robot.load()
+    robot = RobotModel.load()
     full = ry.Config()
     full.addFile(ry.raiPath(robot.source))
     full.selectJoints(list(robot.model_joints))
@@ -78,7 +78,7 @@ def test_the_pads_touch_a_handle_of_its_height(world: World, model: KinematicMod
 
 
 def test_the_boxes_contain_the_surfaces() -> None:
-    robot = Robot.load()
+    robot = RobotModel.load()
     parts = surfaces(robot, 0.02)
     for name, box in boxes(robot).items():
         distances = box_distance(parts[name].points - box.centre, box.size)

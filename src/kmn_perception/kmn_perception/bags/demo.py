@@ -32,7 +32,7 @@ from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.pipeline import PipelineSettings
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
 from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient, ProcessError
 from kmn_perception.ros.parameters import declare_parameters
 from kmn_perception.scene.segmentation import segment
@@ -80,7 +80,7 @@ class FoundObject(NamedTuple):
         return "  ".join([*texts, self.status.name, self.parameters.reason])
 
 
-class Answer(NamedTuple):
+class FrameReply(NamedTuple):
     """What morph_node made of a frame, and the seconds from its publication to the answer."""
 
     objects: list[FoundObject]
@@ -125,7 +125,7 @@ class Listener:
             "morph_node",
         )
 
-    def wait_for(self, stamp: int) -> Answer | None:
+    def wait_for(self, stamp: int) -> FrameReply | None:
         """Return the answer to the frame of this stamp in nanoseconds, None if there is none."""
         start = time.monotonic()
         try:
@@ -133,7 +133,9 @@ class Listener:
         except NoAnswerError:
             return None
         latency = time.monotonic() - start
-        return Answer([self._found(parameters) for parameters in self._received[stamp]], latency)
+        return FrameReply(
+            [self._found(parameters) for parameters in self._received[stamp]], latency
+        )
 
     def _is_complete(self, stamp: int) -> bool:
         """Tell whether there is a message for each object that is drawn, or that there is none."""
@@ -157,7 +159,9 @@ def node_arguments() -> list[str]:
     return ["--params-file", str(file), *parameters, "-r", alone]
 
 
-def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> list[Answer | None]:
+def estimate_frames(
+    node: Node, model: KinematicModel, bag: Path, log: Path
+) -> list[FrameReply | None]:
     """Replay the bag into morph_node, print its answers and return them; None for no answer.
 
     Raises
@@ -184,7 +188,7 @@ def estimate_frames(node: Node, model: KinematicModel, bag: Path, log: Path) -> 
 
 
 def draw_frames(
-    answers: Sequence[Answer | None], model: KinematicModel, settings: PipelineSettings
+    answers: Sequence[FrameReply | None], model: KinematicModel, settings: PipelineSettings
 ) -> Iterator[Overlay]:
     """Yield the picture of each frame: the points of its objects and the estimated models."""
     intrinsics = Camera.load(CAMERA)
@@ -218,7 +222,7 @@ def run(folder: Path) -> int:
     shutil.rmtree(bag, ignore_errors=True)
     make_example_bag(bag, RATE)
     node = rclpy.create_node("demo", cli_args=["--ros-args", *node_arguments()])
-    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
+    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     model = KinematicModel.load(settings.model)
     print(f"starting morph_node, which logs to {log}", flush=True)
     answers = estimate_frames(node, model, bag, log)

@@ -21,7 +21,7 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
 from kmn_perception.ros.parameters import declare_parameters
 
 THREADS = 1  # of torch; as morph_node sets it
@@ -44,7 +44,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
     """Measure stages and transport with the parameters of morph_node, as written to JSON."""
-    settings = NodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
+    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
     torch.set_num_threads(THREADS)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)

@@ -19,14 +19,14 @@ from kmn_perception.ros.messages import (
     parameters_from_estimate,
     points_from_cloud,
 )
-from kmn_perception.ros.morph_node_parameters import NodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 
 STEPS = 5  # predictions, as in the paper, or as many as the network makes
 Stage = Callable[[], object]
 
 
 def chain(
-    pipeline: MorphPipeline, settings: NodeSettings, cloud: PointCloud2
+    pipeline: MorphPipeline, settings: MorphNodeSettings, cloud: PointCloud2
 ) -> tuple[dict[str, Stage], int]:
     """Return the stages that a cloud goes through, and the number of the object's points.
 

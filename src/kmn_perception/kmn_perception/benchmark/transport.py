@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.morph_node_parameters import NodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 
 TOPIC = "benchmark/points"  # not `points`: nodes that run beside are left alone
 PERIOD = 0.1  # seconds
@@ -26,7 +26,7 @@ DISCOVERY_MARGIN = 0.5  # seconds for both sides to know each other
 FLUSH = 2.0  # seconds for the last clouds to arrive
 
 
-def measure(node: Node, settings: NodeSettings, frames: int) -> dict[str, float]:
+def measure(node: Node, settings: MorphNodeSettings, frames: int) -> dict[str, float]:
     """Receive, as morph_node does, the clouds that another process publishes at 10 Hz.
 
     Returns

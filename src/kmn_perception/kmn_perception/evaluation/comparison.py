@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from kmn_perception.evaluation.coverage import is_covered
 from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.information_limit import best_estimate
-from kmn_perception.evaluation.methods import METHODS, PEERS, Estimate, Method, MethodError, choose
+from kmn_perception.evaluation.methods import (
+    METHODS,
+    PEERS,
+    Method,
+    MethodError,
+    MethodEstimate,
+    choose,
+)
 from kmn_perception.evaluation.networks import Networks, load_networks
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
@@ -123,8 +130,10 @@ class Comparison:
         estimates = self._methods[name].estimates(observation)
         return [estimate.values for estimate in islice(estimates, self.counted[name] + 1)]
 
-    def _best(self, observation: Observation, truth: NDArray[np.float64]) -> Iterator[Estimate]:
-        yield Estimate(best_estimate(self.model, observation.camera, truth))
+    def _best(
+        self, observation: Observation, truth: NDArray[np.float64]
+    ) -> Iterator[MethodEstimate]:
+        yield MethodEstimate(best_estimate(self.model, observation.camera, truth))
 
     def _measure(
         self, method: Method, observation: Observation, truth: NDArray[np.float64]

@@ -32,7 +32,7 @@ class MethodError(ValueError):
     """A method needs what a model does not have."""
 
 
-class Estimate(NamedTuple):
+class MethodEstimate(NamedTuple):
     """Morphing parameters (n + m,), and their covariance (n + m, n + m) if the method gives it."""
 
     values: NDArray[np.float64]
@@ -51,7 +51,7 @@ class Method:
         Number of the step whose estimate is the result.
     """
 
-    estimates: Callable[[Observation], Iterator[Estimate]]
+    estimates: Callable[[Observation], Iterator[MethodEstimate]]
     counted: int
 
 
@@ -81,11 +81,11 @@ def kmn_refined(model: KinematicModel, networks: Networks, settings: EvaluationS
     """Return the model's fit to the observation, from our network's estimate."""
     predicted, fit = kmn(model, networks, settings), RefinementSettings.load()
 
-    def estimates(observation: Observation) -> Iterator[Estimate]:
+    def estimates(observation: Observation) -> Iterator[MethodEstimate]:
         *_, last = islice(predicted.estimates(observation), predicted.counted + 1)
         yield last
         refined = refine(model, observation, last.values, fit)
-        yield Estimate(refined.values, refined.covariance)
+        yield MethodEstimate(refined.values, refined.covariance)
 
     return Method(estimates, counted=1)
 
@@ -94,9 +94,9 @@ def multistart(model: KinematicModel, networks: Networks, settings: EvaluationSe
     """Return the model's fit to the observation from many starts, without a network."""
     fit = RefinementSettings.load()
 
-    def estimates(observation: Observation) -> Iterator[Estimate]:
+    def estimates(observation: Observation) -> Iterator[MethodEstimate]:
         refined = refine_from_scratch(model, observation, fit)
-        yield Estimate(refined.values, refined.covariance)
+        yield MethodEstimate(refined.values, refined.covariance)
 
     return Method(estimates, counted=0)
 
@@ -110,9 +110,9 @@ def icp_identity(model: KinematicModel, networks: Networks, settings: Evaluation
     """Return point-to-point ICP as in the paper: from the identity, wherever it ends."""
     aligner = point_to_point(_prototype(model), settings.icp)
 
-    def estimates(observation: Observation) -> Iterator[Estimate]:
-        yield Estimate(np.zeros(len(model.parameters)))
-        yield Estimate(_values(model, aligner(observation.points, np.eye(4))))
+    def estimates(observation: Observation) -> Iterator[MethodEstimate]:
+        yield MethodEstimate(np.zeros(len(model.parameters)))
+        yield MethodEstimate(_values(model, aligner(observation.points, np.eye(4))))
 
     return Method(estimates, counted=1)
 
@@ -166,8 +166,8 @@ def _loaded(weights: Weights | WeightsError) -> Weights:
 
 
 def _iterated(network: MorphNetwork, counted: int) -> Method:
-    def estimates(observation: Observation) -> Iterator[Estimate]:
-        return (Estimate(values[0]) for values in values_by_step(network, [observation]))
+    def estimates(observation: Observation) -> Iterator[MethodEstimate]:
+        return (MethodEstimate(values[0]) for values in values_by_step(network, [observation]))
 
     return Method(estimates, counted)
 
@@ -185,10 +185,10 @@ def _registered(model: KinematicModel, aligner: Aligner) -> Method:
     """
     prototype = _prototype(model)
 
-    def estimates(observation: Observation) -> Iterator[Estimate]:
+    def estimates(observation: Observation) -> Iterator[MethodEstimate]:
         start = centre_to_centre(observation.points, prototype)
         for to_prototype in (start, aligner(observation.points, start)):
-            yield Estimate(np.clip(_values(model, to_prototype), *model.limits.T))
+            yield MethodEstimate(np.clip(_values(model, to_prototype), *model.limits.T))
 
     return Method(estimates, counted=1)
 

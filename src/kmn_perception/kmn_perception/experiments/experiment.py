@@ -27,7 +27,7 @@ from kmn_perception.network import weights
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError, ObjectEstimate
-from kmn_perception.ros.morph_node_parameters import NodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 
 REPETITIONS = 3  # of a frame, for its time
 PARAMETER_FILES = ("morph_node", "morph_node_tabletop")  # the later overrides the earlier
@@ -74,7 +74,7 @@ def load_pipeline() -> MorphPipeline:
     for name in PARAMETER_FILES:
         file = yaml.safe_load(resources.find("config/nodes", name).read_text(encoding="utf-8"))
         values.update(file["/**"]["ros__parameters"])
-    settings = NodeSettings.check(values)
+    settings = MorphNodeSettings.check(values)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()

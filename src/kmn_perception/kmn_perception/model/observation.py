@@ -19,12 +19,12 @@ class FreeSpace(NamedTuple):
     free_depth
         Depth in metres up to which a pixel was seen to be empty: infinite for all of its line of
         sight, 0 where nothing is known. Beyond it the object may be hidden.
-    presumed
+    interpolated
         Nothing was measured there; the depth is what those beside it suggest.
     """
 
     free_depth: NDArray[np.float32]
-    presumed: NDArray[np.bool_]
+    interpolated: NDArray[np.bool_]
 
 
 def all_free(height: int, width: int) -> FreeSpace:

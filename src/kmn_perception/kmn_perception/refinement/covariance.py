@@ -37,7 +37,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     information = (fit.depth_information + fit.edge_information) * np.outer(half, half)
     eigenvalues, directions = np.linalg.eigh(information)
     variances = 1.0 / np.maximum(eigenvalues, MIN_INFORMATION)
-    is_open = variances > problem.settings.weak**2
+    is_open = variances > problem.settings.unobservable**2
     directions[:, is_open] = _disentangled(directions[:, is_open])
     for i, j in combinations(np.flatnonzero(is_open), 2):
         directions[:, [i, j]] = _more_open(problem, fit, directions[:, [i, j]])
@@ -102,7 +102,7 @@ def _leads_far(problem: Problem, fit: Fit, direction: NDArray[np.float64]) -> bo
     loss = _loss_along(problem, fit, fit.values, direction)
     allowed = loss(0.0) + problem.settings.segment_rise
     low, high = _within_limits(problem, fit.values, direction)
-    far = problem.settings.weak
+    far = problem.settings.unobservable
     return any(low <= way <= high and loss(way) <= allowed for way in (-far, far))
 
 

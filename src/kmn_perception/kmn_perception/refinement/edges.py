@@ -16,16 +16,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.correlation import correlated_count
-from kmn_perception.refinement.image import Image
+from kmn_perception.refinement.image import InverseDepthImage
 from kmn_perception.refinement.silhouette import EdgeSettings, half_chord, scan, split
-from kmn_perception.refinement.view import PLANES, View, add_normal_equations
+from kmn_perception.refinement.view import PLANES, ModelView, add_normal_equations
 
 MAX_WINDOW = 64  # pixels to either side of an edge
 ROOT_HALF = math.sqrt(0.5)
 ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 FAR = 6.0  # standard deviations inside its own side, where a pixel says nothing more
 LOST = 0.25  # weight of a coarse sample without a step
-PHASES = 3.0  # an edge that crosses 1/3 of a pixel along its way averages where it cuts the rows
+SUBPIXEL_PHASES = (
+    3.0  # an edge that crosses 1/3 of a pixel along its way averages where it cuts the rows
+)
 LAGS = 32  # samples of an edge that may be shifted alike
 EXACT = 0.5  # pixels by which the pixels' grid shifts a step
 VISIBLE = 0.5  # share of an edge's samples with a step, from which on it is in view
@@ -56,8 +58,8 @@ class EdgeTerms(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def edge_terms(
-    view: View,
-    image: Image,
+    view: ModelView,
+    image: InverseDepthImage,
     settings: EdgeSettings,
     window: float,
     noise: float,
@@ -100,8 +102,8 @@ def edge_terms(
 
 @njit(cache=True, error_model="numpy")
 def _add_edge(
-    view: View,
-    image: Image,
+    view: ModelView,
+    image: InverseDepthImage,
     settings: EdgeSettings,
     window: float,
     noise: float,
@@ -116,7 +118,7 @@ def _add_edge(
 ) -> bool:
     """Add the samples of an edge, one in each row (or column); tell whether it is in view."""
     solids, lines, all_ends, faces = view.solids, view.lines[b], view.ends[b], view.faces[b]
-    inverse_depth, presumed, upwards = image.inverse_depth, image.presumed, image.upwards
+    inverse_depth, interpolated, upwards = image.inverse_depth, image.interpolated, image.upwards
     lowest = image.floor + settings.floor_margin
     evidence = np.empty(4 * MAX_WINDOW)
     line, ends = lines[edge], all_ends[edge]
@@ -140,7 +142,7 @@ def _add_edge(
             continue
         chord = half_chord(lines, all_ends, faces, edge, rows, a, position)
         start, step, count = scan(
-            solids, inverse_depth, presumed, settings, depth_noise, b, line[1 - along],
+            solids, inverse_depth, interpolated, settings, depth_noise, b, line[1 - along],
             at_edge, rows, a, position, window, chord, evidence,
         )  # fmt: skip
         if count == 0:
@@ -174,7 +176,7 @@ def _add_edge(
         sums[0] += 0.5 * weight * distance**2
         _add(moment, force, weight, weight * distance, u, v)
     if noise > 0.0:
-        span = PHASES * (last - first) * abs(line[along] / line[1 - along])
+        span = SUBPIXEL_PHASES * (last - first) * abs(line[along] / line[1 - along])
         weight = 1.0 / (1.0 + moment[2, 2] / (12.0 * (1.0 + span**2)))
         weight *= _independent(shifts)
         moment *= weight

@@ -12,7 +12,7 @@ from kmn_perception.refinement.planes import PlaneTerms, plane_terms
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.reacquisition import reacquire
 from kmn_perception.refinement.settings import SearchSettings
-from kmn_perception.refinement.view import View
+from kmn_perception.refinement.view import ModelView
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations
@@ -115,7 +115,7 @@ def _estimate_noise(
     return Noise(max(depth, least.depth), min(max(lateral, least.lateral), most))
 
 
-def fine_edges(problem: Problem, view: View, noise: Noise, border: float) -> EdgeTerms:
+def fine_edges(problem: Problem, view: ModelView, noise: Noise, border: float) -> EdgeTerms:
     """Return the likelihood of the pixels beside the edges, but ``border`` s from their ends."""
     fine = problem.settings.fine
     window = max(fine.min_window, fine.window * noise.lateral)

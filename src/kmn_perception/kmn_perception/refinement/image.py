@@ -13,11 +13,11 @@ from kmn_perception.refinement.view import projection
 
 HALF = 0.5
 THICKNESS = 0.004  # metres; other objects are at least as thick
-PRESUMED = 0.01  # metres by which presumed depths may be wrong
+INTERPOLATED = 0.01  # metres by which interpolated depths may be wrong
 MIN_RANGE = 1e-6  # metres
 
 
-class Image(NamedTuple):
+class InverseDepthImage(NamedTuple):
     """What the sensor saw, in its own pixels.
 
     Attributes
@@ -26,7 +26,7 @@ class Image(NamedTuple):
         (height, width) 1 / m where the object was seen. Elsewhere it is the negative of the inverse
         depth up to which the pixel was seen to be empty: 0 for all of its line of sight, minus
         infinity where nothing is known.
-    presumed
+    interpolated
         (height, width) nothing was measured there.
     pixels
         (N, 3) u, v and inverse depth of all that was seen.
@@ -42,7 +42,7 @@ class Image(NamedTuple):
     """
 
     inverse_depth: NDArray[np.float32]
-    presumed: NDArray[np.bool_]
+    interpolated: NDArray[np.bool_]
     pixels: NDArray[np.float32]
     projection: NDArray[np.float64]
     upwards: NDArray[np.float64]
@@ -51,7 +51,7 @@ class Image(NamedTuple):
     farthest: float
 
 
-def image_of(observation: Observation) -> Image:
+def inverse_depth_image(observation: Observation) -> InverseDepthImage:
     """Put the points back into the pixels from which they came."""
     camera = observation.camera
     matrix = projection(camera)
@@ -63,9 +63,9 @@ def image_of(observation: Observation) -> Image:
     pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
-    return Image(
+    return InverseDepthImage(
         inverse_depth,
-        around.presumed,
+        around.interpolated,
         pixels,
         matrix,
         upwards,
@@ -76,18 +76,18 @@ def image_of(observation: Observation) -> Image:
 
 
 @njit(cache=True, error_model="numpy")
-def may_hide(seen: float, presumed: bool, inverse_depth: float) -> bool:
+def may_hide(seen: float, interpolated: bool, inverse_depth: float) -> bool:
     """Tell whether something may be at an inverse depth, though the pixel does not show it.
 
     It cannot be just behind what was measured, where the inside of another object is. What is
-    presumed may be the surface of the very object, but not behind it.
+    interpolated may be the surface of the very object, but not behind it.
 
     Parameters
     ----------
-    seen, presumed
-        The pixel's values in `Image`; the former is not positive.
+    seen, interpolated
+        The pixel's values in `InverseDepthImage`; the former is not positive.
     """
-    margin = -PRESUMED if presumed else THICKNESS
+    margin = -INTERPOLATED if interpolated else THICKNESS
     return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen + margin
 
 

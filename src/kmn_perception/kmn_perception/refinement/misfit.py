@@ -6,15 +6,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import Image, may_hide
-from kmn_perception.refinement.view import View, raycast_any
+from kmn_perception.refinement.image import InverseDepthImage, may_hide
+from kmn_perception.refinement.view import ModelView, raycast_any
 
 MOST = 15  # times as many pixels as asked for are looked at in all
 DIGITS = 6  # of the share; less is the rounding of the points
 
 
 @njit(cache=True, error_model="numpy")
-def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
+def misfit(view: ModelView, image: InverseDepthImage, count: int, depth_scale: float) -> float:
     """Return the share of pixels that the model explains wrongly.
 
     A pixel that shows something where the model has nothing, or the other way round, counts 1, and
@@ -45,9 +45,9 @@ def misfit(view: View, image: Image, count: int, depth_scale: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
+def _unseen(solids: NDArray[np.float64], image: InverseDepthImage, count: int) -> float:
     """Return the number of pixels that were seen to be empty, though the model is there."""
-    inverse_depth, presumed = image.inverse_depth, image.presumed
+    inverse_depth, interpolated = image.inverse_depth, image.interpolated
     height, width = inverse_depth.shape
     left, right = max(solids[:, 0].min(), 0.0), min(solids[:, 1].max(), width - 1.0)
     top, bottom = max(solids[:, 2].min(), 0.0), min(solids[:, 3].max(), height - 1.0)
@@ -61,12 +61,14 @@ def _unseen(solids: NDArray[np.float64], image: Image, count: int) -> float:
             seen = float(inverse_depth[row, column])
             if seen <= 0.0:
                 predicted = _predicted(solids, image, float(column), float(row))
-                unseen += predicted > 0.0 and not may_hide(seen, presumed[row, column], predicted)
+                unseen += predicted > 0.0 and not may_hide(
+                    seen, interpolated[row, column], predicted
+                )
     return float(unseen * step**2)
 
 
 @njit(cache=True, error_model="numpy")
-def _predicted(solids: NDArray[np.float64], image: Image, u: float, v: float) -> float:
+def _predicted(solids: NDArray[np.float64], image: InverseDepthImage, u: float, v: float) -> float:
     """Return the inverse depth at which a pixel should show the model, 0 if it should not."""
     predicted, _, _ = raycast_any(solids, u, v)
     if predicted < image.farthest or predicted > image.nearest:

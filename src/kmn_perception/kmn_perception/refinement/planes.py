@@ -10,8 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.correlation import correlated_count
-from kmn_perception.refinement.image import Image
-from kmn_perception.refinement.view import PLANES, View, add_normal_equations, raycast_any
+from kmn_perception.refinement.image import InverseDepthImage
+from kmn_perception.refinement.view import PLANES, ModelView, add_normal_equations, raycast_any
 
 LAGS = 8  # rows that may be shifted alike
 
@@ -34,8 +34,8 @@ class PlaneTerms(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def plane_terms(
-    view: View,
-    image: Image,
+    view: ModelView,
+    image: InverseDepthImage,
     stride: int,
     noise: float,
     lateral: float,

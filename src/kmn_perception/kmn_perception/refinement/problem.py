@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.geometry import Shape, cuboids, shape_of
-from kmn_perception.refinement.image import Image, image_of
+from kmn_perception.refinement.image import InverseDepthImage, inverse_depth_image
 from kmn_perception.refinement.misfit import misfit
 from kmn_perception.refinement.settings import RefinementSettings
-from kmn_perception.refinement.view import View, view_of
+from kmn_perception.refinement.view import ModelView, model_view
 
 SOME = 1000  # pixels that tell the object's distance
 MIN_MOVEMENT = 1e-12  # pixels per unit
@@ -26,7 +26,7 @@ class Problem:
 
     shape: Shape
     limits: NDArray[np.float64]
-    image: Image
+    image: InverseDepthImage
     settings: RefinementSettings
 
     @classmethod
@@ -34,7 +34,7 @@ class Problem:
         cls, model: KinematicModel, observation: Observation, settings: RefinementSettings
     ) -> Problem:
         """Return the problem of fitting a model to an observation."""
-        return cls(shape_of(model), model.limits, image_of(observation), settings)
+        return cls(shape_of(model), model.limits, inverse_depth_image(observation), settings)
 
     @cached_property
     def half_range(self) -> NDArray[np.float64]:
@@ -50,9 +50,9 @@ class Problem:
         """Return which of the observed pixels to take, so that there are about so many."""
         return max(1, round(len(self.image.pixels) / pixels))
 
-    def view(self, values: NDArray[np.float64]) -> View:
+    def view(self, values: NDArray[np.float64]) -> ModelView:
         """Return the model at ``values`` (P,) as the sensor sees it."""
-        return view_of(self.shape, values, self.image.projection)
+        return model_view(self.shape, values, self.image.projection)
 
     def misfit(self, values: NDArray[np.float64]) -> float:
         """Return the share of pixels that the model explains wrongly, from some of them."""

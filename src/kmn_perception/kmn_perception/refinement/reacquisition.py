@@ -9,13 +9,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import Shape, cuboids
-from kmn_perception.refinement.image import Image, may_hide
-from kmn_perception.refinement.view import View, raycast, raycast_any, view_of
+from kmn_perception.refinement.image import InverseDepthImage, may_hide
+from kmn_perception.refinement.view import ModelView, model_view, raycast, raycast_any
 
 
 def reacquire(
     shape: Shape,
-    image: Image,
+    image: InverseDepthImage,
     limits: NDArray[np.float64],
     values: NDArray[np.float64],
     tries: int,
@@ -35,7 +35,7 @@ def reacquire(
     for b, own in enumerate(_own_parameters(shape, values)):
         if not own:
             continue
-        best = support(view_of(shape, values, image.projection), image, b)
+        best = support(model_view(shape, values, image.projection), image, b)
         if best >= enough:
             continue
         start, count = values, max(2, int(tries ** (1.0 / len(own))))
@@ -43,7 +43,7 @@ def reacquire(
         for place in itertools.product(*axes):
             candidate = start.copy()
             candidate[own] = place
-            found = support(view_of(shape, candidate, image.projection), image, b)
+            found = support(model_view(shape, candidate, image.projection), image, b)
             if found > best:
                 values, best = candidate, found
     return values
@@ -59,13 +59,13 @@ def _own_parameters(shape: Shape, values: NDArray[np.float64]) -> list[list[int]
 
 
 @njit(cache=True, error_model="numpy")
-def support(view: View, image: Image, body: int) -> float:
+def support(view: ModelView, image: InverseDepthImage, body: int) -> float:
     """Return the part of a body's visible pixels that show it, less the part that do not.
 
     A pixel shows the body when its depth is nearer to the body's than to that of what the model has
     behind it. A body that is out of view has full support.
     """
-    solids, inverse_depth, presumed = view.solids, image.inverse_depth, image.presumed
+    solids, inverse_depth, interpolated = view.solids, image.inverse_depth, image.interpolated
     height, width = inverse_depth.shape
     first = max(0, int(np.ceil(max(solids[body, 0], 0.0))))
     last = min(width - 1, int(np.floor(min(solids[body, 1], width - 1.0))))
@@ -84,7 +84,7 @@ def support(view: View, image: Image, body: int) -> float:
                     inverse, _ = raycast(solids, other, u, v)
                     behind = max(behind, inverse)
             seen = float(inverse_depth[row, column])
-            if seen <= 0.0 and may_hide(seen, presumed[row, column], nearest):
+            if seen <= 0.0 and may_hide(seen, interpolated[row, column], nearest):
                 continue
             count += 1
             if 0.5 * (nearest + behind) < seen < 1.5 * nearest - 0.5 * behind:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import NamedTuple
 
@@ -119,7 +119,7 @@ class RefinementSettings:
         By how much of its range a parameter may lie beyond its limits.
     limit_softness
         Standard deviation beyond the limits, as a share of half the range.
-    weak
+    unobservable
         A direction is open when its standard deviation exceeds this share of half the range.
     segment_rise
         It ends where the negative log-likelihood has risen by this.
@@ -136,7 +136,7 @@ class RefinementSettings:
     limit_margin: float
     limit_softness: float
     misfit: MisfitSettings
-    weak: float
+    unobservable: float
     segment_rise: float
 
     @classmethod
@@ -144,12 +144,7 @@ class RefinementSettings:
         """Read the shipped or the user's own file; raise ``ConfigurationError`` if it is wrong."""
         file = path or resources.share_directory() / "config/refinement.yaml"
         section = Section.load(file)
-        section.allow(
-            (
-                "min_points", "depth_pixels", "search", "reacquire", "fine", "edges", "starts",
-                "damping", "limit_margin", "limit_softness", "misfit", "weak", "segment_rise",
-            )
-        )  # fmt: skip
+        section.allow([field.name for field in fields(cls)])
         return cls(
             min_points=section.whole_number("min_points", 1, 10**6),
             depth_pixels=section.whole_number("depth_pixels", 100, 10**8),
@@ -162,7 +157,7 @@ class RefinementSettings:
             limit_margin=section.number("limit_margin", 0.0, 10.0),
             limit_softness=section.number("limit_softness", 1e-6, 1.0),
             misfit=_misfit(section.section("misfit")),
-            weak=section.number("weak", 0.0, 1.0),
+            unobservable=section.number("unobservable", 0.0, 1.0),
             segment_rise=section.number("segment_rise", 0.0, 1e3),
         )
 
@@ -206,14 +201,16 @@ def _fine(section: Section) -> FineSettings:
 
 
 def _edges(section: Section) -> EdgeSettings:
-    section.allow(("occluder", "background", "contrast", "floor_margin", "outliers", "presumed"))
+    section.allow(
+        ("occluder", "background", "contrast", "floor_margin", "outliers", "interpolated")
+    )
     return EdgeSettings(
         occluder=section.number("occluder", 0.0, 10.0),
         background=section.number("background", 0.0, 100.0),
         contrast=section.number("contrast", 0.0, 10.0),
         floor_margin=section.number("floor_margin", 0.0, 10.0),
         outliers=section.number("outliers", 1e-12, 0.49),
-        presumed=section.number("presumed", 0.0, 1.0),
+        interpolated=section.number("interpolated", 0.0, 1.0),
     )
 
 

@@ -31,7 +31,7 @@ class EdgeSettings(NamedTuple):
         Edges less than this above the floor are not used, metres.
     outliers
         Share of pixels that show anything.
-    presumed
+    interpolated
         Of the probability, where nothing was measured.
     """
 
@@ -40,14 +40,14 @@ class EdgeSettings(NamedTuple):
     contrast: float
     floor_margin: float
     outliers: float
-    presumed: float
+    interpolated: float
 
 
 @njit(cache=True, error_model="numpy")
 def scan(
     solids: NDArray[np.float64],
     inverse_depth: NDArray[np.float32],
-    presumed: NDArray[np.bool_],
+    interpolated: NDArray[np.bool_],
     settings: EdgeSettings,
     depth_noise: float,
     b: int,
@@ -97,14 +97,14 @@ def scan(
         if expected == 0.0:
             expected = at_edge
         seen = float(inverse_depth[row, column])
-        if seen <= 0.0 and may_hide(seen, presumed[row, column], expected):
+        if seen <= 0.0 and may_hide(seen, interpolated[row, column], expected):
             evidence[k] = 0.0
             continue
         evidence[k] = _evidence(
             solids, settings, depth_noise, b, float(column), float(row), seen, expected
         )
-        if presumed[row, column]:
-            evidence[k] *= settings.presumed
+        if interpolated[row, column]:
+            evidence[k] *= settings.interpolated
     return start, step, count
 
 

@@ -20,7 +20,7 @@ MIN_DEPTH = 1e-3  # metres in front of the camera; edges are cut off there
 PLANES, VISIBLE, SOLID = 4, 22, 28  # where the planes and flags of a solid begin, and its length
 
 
-class View(NamedTuple):
+class ModelView(NamedTuple):
     """The model as a camera sees it; P parameters, faces and edges numbered within each body.
 
     Face ``2 * axis`` is at -1/2 along the unit cube's axis, ``2 * axis + 1`` at +1/2.
@@ -42,11 +42,13 @@ def projection(camera: Camera) -> NDArray[np.float64]:
 
 
 @njit(cache=True, error_model="numpy")
-def view_of(shape: Shape, values: NDArray[np.float64], projected: NDArray[np.float64]) -> View:
+def model_view(
+    shape: Shape, values: NDArray[np.float64], projected: NDArray[np.float64]
+) -> ModelView:
     """Return the model at ``values`` as a camera of matrix ``projected`` (3, 4) sees it."""
     cubes, cube_slopes = cuboids(shape, values)
     bodies, count = cubes.shape[0], values.shape[0]
-    view = View(
+    view = ModelView(
         np.zeros((bodies, SOLID)),
         np.zeros((bodies, 6, 3, count)),
         np.zeros((bodies, 12, 3)),
@@ -68,7 +70,9 @@ def view_of(shape: Shape, values: NDArray[np.float64], projected: NDArray[np.flo
 
 
 @njit(cache=True, error_model="numpy")
-def _see_faces(view: View, b: int, cube: NDArray[np.float64], slopes: NDArray[np.float64]) -> None:
+def _see_faces(
+    view: ModelView, b: int, cube: NDArray[np.float64], slopes: NDArray[np.float64]
+) -> None:
     """Fill in the planes of the body's faces, and which of them look at the camera."""
     inverse = np.empty((3, 3))
     for axis in range(3):
@@ -102,7 +106,7 @@ def _see_faces(view: View, b: int, cube: NDArray[np.float64], slopes: NDArray[np
 
 @njit(cache=True, error_model="numpy")
 def _see_edges(
-    view: View,
+    view: ModelView,
     b: int,
     cube: NDArray[np.float64],
     slopes: NDArray[np.float64],

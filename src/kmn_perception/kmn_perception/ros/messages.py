@@ -232,7 +232,11 @@ def info_from_camera(camera: Camera, header: Header) -> CameraInfo:
 
 
 def parameters_from_estimate(
-    model: KinematicModel, estimate: Estimate, header: Header, number: int = 0, cut: bool = False
+    model: KinematicModel,
+    estimate: Estimate,
+    header: Header,
+    number: int = 0,
+    truncated: bool = False,
 ) -> MorphingParameters:
     """Make the message of an estimate; the header names the world frame.
 
@@ -240,14 +244,14 @@ def parameters_from_estimate(
     ----------
     number
         Of the object, 0 where there is but one.
-    cut
+    truncated
         Whether the image's border cuts the object.
     """
     return MorphingParameters(
         header=header,
         model=model.name,
         id=number,
-        cut=cut,
+        truncated=truncated,
         theta_names=[parameter.name for parameter in model.theta],
         theta=estimate.theta.tolist(),
         gamma_names=[parameter.name for parameter in model.gamma],

@@ -35,7 +35,7 @@ from kmn_perception.ros.messages import (
     points_from_cloud,
     points_from_depth,
 )
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, NodeSettings
+from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import REPORT_PERIOD, ThrottledWarnings, report_periodically
 from kmn_perception.ros.sensor_watch import SensorWatch
@@ -57,20 +57,20 @@ class Frame(NamedTuple):
     info: CameraInfo | None = None
 
 
-class Found(NamedTuple):
+class DetectedObject(NamedTuple):
     """An object's estimate, its number (0 for one alone) and whether the image cuts it."""
 
     estimate: Estimate
     number: int
-    cut: bool
+    truncated: bool
 
 
-class Answer(NamedTuple):
+class FrameEstimates(NamedTuple):
     """The objects of a frame, with what their messages need."""
 
     model: KinematicModel
     header: Header
-    objects: list[Found]
+    objects: list[DetectedObject]
 
     def parameters(self) -> list[MorphingParameters]:
         """Return the message of each object."""
@@ -88,7 +88,7 @@ class Answer(NamedTuple):
 class Active(NamedTuple):
     """What the node works with at present; replaced as a whole when parameters change."""
 
-    settings: NodeSettings
+    settings: MorphNodeSettings
     pipeline: MorphPipeline
 
 
@@ -107,7 +107,7 @@ class MorphNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("morph_node", **options)
-        settings = NodeSettings.check(declare_parameters(self, "morph_node", DESCRIPTORS))
+        settings = MorphNodeSettings.check(declare_parameters(self, "morph_node", DESCRIPTORS))
         self._active = Active(settings, _load(settings))
         self._statistics = FrameStatistics()
         self._sensor = SensorWatch(REPORT_PERIOD)
@@ -213,7 +213,7 @@ class MorphNode(Node):
                     self._parameters_publisher.publish(parameters)
                 self._model_publisher.publish(answer.markers())
 
-    def _answer(self, frame: Frame, all_objects: bool) -> Answer:
+    def _answer(self, frame: Frame, all_objects: bool) -> FrameEstimates:
         """Estimate a frame; whatever is wrong with it becomes the reason of the answer."""
         settings, pipeline = self._active
         model = pipeline.estimator.model
@@ -227,10 +227,10 @@ class MorphNode(Node):
             objects = pipeline.estimate_all(points, in_world, None if all_objects else 1)
         except MessageError as error:
             self._refuse(error.reason, str(error))
-            return Answer(model, header, [_none(model, str(error))])
+            return FrameEstimates(model, header, [_none(model, str(error))])
         except Exception as error:  # a node never dies of a message
             self._refuse("internal_error", traceback.format_exc())
-            return Answer(model, header, [_none(model, repr(error))])
+            return FrameEstimates(model, header, [_none(model, repr(error))])
         for found in objects:
             status, reason = found.estimate.status, found.estimate.reason
             if status is not Status.OK:
@@ -239,10 +239,13 @@ class MorphNode(Node):
         results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
         self._statistics.use(results, latency)
         numbers = self._number(objects) if all_objects else [0]
-        return Answer(
+        return FrameEstimates(
             model,
             header,
-            [Found(o.estimate, number, o.cut) for o, number in zip(objects, numbers, strict=True)],
+            [
+                DetectedObject(o.estimate, number, o.truncated)
+                for o, number in zip(objects, numbers, strict=True)
+            ],
         )
 
     def _number(self, objects: Sequence[ObjectEstimate]) -> list[int]:
@@ -265,7 +268,7 @@ class MorphNode(Node):
         """Take over changed parameters together, or refuse them with the reason."""
         before, pipeline = self._active
         try:
-            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = MorphNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
             if (settings.model, settings.weights) != (before.model, before.weights):
                 pipeline = _load(settings)
         except (OSError, ValueError) as error:
@@ -278,12 +281,12 @@ class MorphNode(Node):
         return SetParametersResult(successful=True)
 
 
-def _none(model: KinematicModel, reason: str) -> Found:
+def _none(model: KinematicModel, reason: str) -> DetectedObject:
     """Return what a frame that cannot be read holds."""
-    return Found(Estimate.none(model, 0, Status.NO_OBJECT, reason), 0, False)
+    return DetectedObject(Estimate.none(model, 0, Status.NO_OBJECT, reason), 0, False)
 
 
-def _load(settings: NodeSettings) -> MorphPipeline:
+def _load(settings: MorphNodeSettings) -> MorphPipeline:
     """Load model and weights, ready for the first frame."""
     torch.set_num_threads(1)  # more are slower for these small networks
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)

@@ -33,7 +33,7 @@ LENGTHS = {"camera_position": 3, "camera_quaternion": 4, "crop_min": 3, "crop_ma
 
 
 @dataclass(frozen=True, eq=False)
-class NodeSettings:
+class MorphNodeSettings:
     """All parameters of morph_node, checked.
 
     Attributes
@@ -65,7 +65,7 @@ class NodeSettings:
     pipeline: PipelineSettings
 
     @classmethod
-    def check(cls, values: Mapping[str, Any]) -> NodeSettings:
+    def check(cls, values: Mapping[str, Any]) -> MorphNodeSettings:
         """Check the parameters' values, by name, one by one and together.
 
         Raises

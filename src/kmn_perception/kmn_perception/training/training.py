@@ -32,7 +32,7 @@ VALIDATION_STEPS = 5
 
 
 @dataclass
-class State:
+class TrainingState:
     """How far a run has come; what a checkpoint holds beside the networks and the optimiser."""
 
     round: int = 0  # 0 is the first training, then one for each augmentation
@@ -63,14 +63,14 @@ class Training(ABC):
     ) -> None:
         torch.manual_seed(settings.seed)
         self.model, self.settings, self.run, self.workers = model, settings, run, workers
-        self.state = State()
+        self.state = TrainingState()
         self.samples = math.ceil(settings.samples / workers.count)  # N_data of this process
 
     def train(self) -> None:
         """Train to the end, from wherever the last checkpoint left it."""
         checkpoint = self.run.load(self.workers.device)
         if checkpoint is not None:
-            self.state = State(**checkpoint["state"])
+            self.state = TrainingState(**checkpoint["state"])
             self.workers.say(f"resuming in round {self.state.round}")
         while self.state.round <= self.settings.rounds:
             self.begin_round()

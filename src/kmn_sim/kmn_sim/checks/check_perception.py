@@ -16,7 +16,7 @@ from kmn_perception.command_line.columns import columns
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import ros_session
-from kmn_sim.checks.scene_client import Answer, scene_client
+from kmn_sim.checks.scene_client import SceneEstimate, scene_client
 from kmn_sim.sensors.kinect import NOISES
 
 TOLERANCE = 0.01  # metres, radians and scales
@@ -55,7 +55,7 @@ def in_view(unit_cubes: NDArray[np.float64], camera: Camera) -> bool:
     return bool(inside.all())
 
 
-def errors(model: KinematicModel, answer: Answer) -> NDArray[np.float64]:
+def errors(model: KinematicModel, answer: SceneEstimate) -> NDArray[np.float64]:
     """Return the absolute errors (n + m,) of an answer, of an equivalent object where nearer."""
     estimate = model.nearest_equivalent(answer.estimate, answer.truth)
     return np.abs(estimate - answer.truth)

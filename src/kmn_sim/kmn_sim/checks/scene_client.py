@@ -26,7 +26,7 @@ ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene
 CAMERA_RATE = 4.0  # frames a second; morph_node shall not fall behind
 
 
-class Answer(NamedTuple):
+class SceneEstimate(NamedTuple):
     """True and estimated morphing parameters (n + m,) of a scene, and how it went.
 
     Attributes
@@ -71,7 +71,7 @@ class SceneClient:
             "morph_node",
         )
 
-    def show(self, values: NDArray[np.float64]) -> Answer:
+    def show(self, values: NDArray[np.float64]) -> SceneEstimate:
         """Set a scene of morphing parameters (n + m,) and return the estimate of it.
 
         Raises
@@ -85,7 +85,7 @@ class SceneClient:
         self._estimates.clear()
         estimate, received = self._client.wait(self._answered, ANSWER_TIMEOUT, "morph_node")
         truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
-        return Answer(
+        return SceneEstimate(
             np.array([*truth.theta, *truth.gamma]),
             np.array([*estimate.theta, *estimate.gamma]),
             int(estimate.status),

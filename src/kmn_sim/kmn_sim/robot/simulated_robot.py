@@ -16,7 +16,7 @@ UNLIMITED = 1e6  # radians; of joints that turn on and on
 HAND_LINKS = ("finger",)  # parts of link names whose contact is that of the grip
 
 
-class Robot:
+class SimulatedRobot:
     """The robot, with its base on a floor of a given height.
 
     Attributes

@@ -27,7 +27,7 @@ from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
 from kmn_sim.control.trajectory import TrajectoryError
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.ros import messages
-from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, FILM, SENSOR, WORLD, NodeSettings
+from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
 from kmn_sim.sensors.recording import Recorder
@@ -51,7 +51,7 @@ class SimNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
-        self._settings = settings = NodeSettings.check(
+        self._settings = settings = SimNodeSettings.check(
             declare_parameters(self, "sim_node", DESCRIPTORS)
         )
         self._depth_camera = self._make_camera(settings)
@@ -67,9 +67,9 @@ class SimNode(Node):
         )
         self._camera_task = self._runner.every(1.0 / settings["camera_rate"], self._publish_camera)
         self._recorder: Recorder | None = None
-        self._film_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
+        self._recording_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
         self._runner.start()
-        self._change_film(settings)
+        self._change_recording(settings)
         self._renderer = renderer = self._runner.call(lambda simulation: simulation.renderer.name)
         if renderer != settings["renderer"]:
             self.get_logger().warning(
@@ -110,7 +110,7 @@ class SimNode(Node):
         )
 
     @staticmethod
-    def _make_camera(settings: NodeSettings) -> DepthCamera:
+    def _make_camera(settings: SimNodeSettings) -> DepthCamera:
         return DepthCamera(
             settings.camera, settings["camera_mount"], settings["noise"], settings["seed"]
         )
@@ -168,14 +168,14 @@ class SimNode(Node):
         if self._recorder is not None:
             self._recorder.take(simulation)
 
-    def _change_film(self, settings: NodeSettings) -> None:
+    def _change_recording(self, settings: SimNodeSettings) -> None:
         """Write the film that is being made, if any, and begin the one that is asked for."""
         file, rate = settings["record"], settings["record_rate"]
         recorder = Recorder(Path(file), rate) if file else None
 
         def exchange(simulation: Simulation) -> Recorder | None:
             before, self._recorder = self._recorder, recorder
-            self._film_task.period = 1.0 / rate
+            self._recording_task.period = 1.0 / rate
             return before
 
         if (before := self._runner.call(exchange)) is not None:
@@ -200,7 +200,7 @@ class SimNode(Node):
         response.success, response.message = True, "all is where it started"
         return response
 
-    def _rebuild(self, settings: NodeSettings) -> None:
+    def _rebuild(self, settings: SimNodeSettings) -> None:
         """Build the world anew, with a camera whose noise begins anew."""
         camera = self._make_camera(settings)
 
@@ -213,15 +213,15 @@ class SimNode(Node):
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
         try:
-            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = SimNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
             self._rebuild(settings)
         elif settings.differs(self._settings, SENSOR):
             self._depth_camera = self._make_camera(settings)
-        if settings.differs(self._settings, FILM):
-            self._change_film(settings)
+        if settings.differs(self._settings, RECORDING):
+            self._change_recording(settings)
         self._settings = settings
         self._runner.real_time_factor = settings["real_time_factor"]
         self._states_task.period = 1.0 / settings["joint_state_rate"]

@@ -31,11 +31,11 @@ ENCODINGS = ("32FC1", "16UC1")
 OPTIONS = ("stem", "frame", "wall", "floor", "table")
 WORLD = ("model", "placement", "values", "seed", "direction", *OPTIONS)
 SENSOR = ("model", "camera", "camera_mount", "noise", "seed")
-FILM = ("record", "record_rate")
+RECORDING = ("record", "record_rate")
 
 
 @dataclass(frozen=True, eq=False)
-class NodeSettings:
+class SimNodeSettings:
     """All parameters of sim_node, checked.
 
     Attributes
@@ -53,7 +53,7 @@ class NodeSettings:
     camera: Camera
 
     @classmethod
-    def check(cls, values: Mapping[str, Any]) -> NodeSettings:
+    def check(cls, values: Mapping[str, Any]) -> SimNodeSettings:
         """Check the parameters' values, by name, one by one and together.
 
         Raises
@@ -78,7 +78,7 @@ class NodeSettings:
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
 
-    def differs(self, other: NodeSettings, names: tuple[str, ...]) -> bool:
+    def differs(self, other: SimNodeSettings, names: tuple[str, ...]) -> bool:
         """Tell whether one of some parameters has another value."""
         return any(self[name] != other[name] for name in names)
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from kmn_perception.model.camera import Camera, look_at
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import DoorSettings, RecordingSettings
+from kmn_sim.world.settings import DoorMechanics, RecordingSettings
 from kmn_sim.world.simulation import Simulation
 
 FORMATS = (".gif", ".mp4")
@@ -72,7 +72,7 @@ def _view(scenario: Scenario, settings: RecordingSettings) -> NDArray[np.float64
     """Return the pose (4, 4) of the camera that shows what is done."""
     if not scenario.is_door:
         return look_at(settings.box_position, settings.box_target)
-    start = np.array(DoorSettings.load().robot[:2])
+    start = np.array(DoorMechanics.load().robot[:2])
     way = scenario.model.transformation.matrix(scenario.theta)[:2, 3] - start
     along = way / np.linalg.norm(way)
     left = np.array([-along[1], along[0]])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import BoxSettings, DoorSettings
+from kmn_sim.world.settings import BoxSettings, DoorMechanics
 
 FLOOR_SIZE, FLOOR_THICKNESS = 12.0, 0.1  # metres
 PANEL, HANDLE = (0.62, 0.46, 0.32, 1.0), (0.75, 0.75, 0.78, 1.0)  # colours
@@ -30,7 +30,7 @@ class Cuboid(NamedTuple):
         return pose @ cube
 
 
-def door_cuboids(scenario: Scenario, settings: DoorSettings) -> dict[str, list[Cuboid]]:
+def door_cuboids(scenario: Scenario, settings: DoorMechanics) -> dict[str, list[Cuboid]]:
     """Return the cuboids of a door's links in the object frame: of the bodies, and of ``world``.
 
     The stem belongs to the body that turns about its axis, the handle.
@@ -80,7 +80,7 @@ def table_cuboids(settings: BoxSettings) -> list[Cuboid]:
     ]
 
 
-def _stem(scenario: Scenario, panel: Cuboid, lever: Cuboid, settings: DoorSettings) -> Cuboid:
+def _stem(scenario: Scenario, panel: Cuboid, lever: Cuboid, settings: DoorMechanics) -> Cuboid:
     """Return the stem, which fills the space between lever and panel at the lever's pivot."""
     joint = next(joint for joint in scenario.model.joints if joint.body == "handle")
     start = lever.centre[0] + lever.size[0] / 2.0

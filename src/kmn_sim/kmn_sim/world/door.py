@@ -13,7 +13,7 @@ from kmn_perception.model.rotation import quaternion_from_matrix
 from kmn_sim.world.cuboids import door_cuboids
 from kmn_sim.world.door_urdf import door_urdf
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import DoorSettings
+from kmn_sim.world.settings import DoorMechanics
 
 PANEL_LINK, HANDLE_LINK = 0, 1  # the order of the model's joints
 PRELOAD_WIDTH = 0.01  # radians over which the spring's preload sets in
@@ -39,7 +39,7 @@ class Door:
         Number of the body in the physics.
     """
 
-    def __init__(self, physics: Any, scenario: Scenario, settings: DoorSettings) -> None:
+    def __init__(self, physics: Any, scenario: Scenario, settings: DoorMechanics) -> None:
         self._physics, self._settings = physics, settings
         hinge, handle = scenario.model.joints
         opening = (0.0, settings.opening)

@@ -27,7 +27,7 @@ class PhysicsSettings(NamedTuple):
         )
 
 
-class DoorSettings(NamedTuple):
+class DoorMechanics(NamedTuple):
     """Mechanics of the door and sizes of its surroundings; SI units.
 
     Attributes
@@ -74,7 +74,7 @@ class DoorSettings(NamedTuple):
     robot: tuple[float, ...]
 
     @classmethod
-    def load(cls) -> DoorSettings:
+    def load(cls) -> DoorMechanics:
         """Read ``config/simulation/door.yaml``."""
         section = _load("door")
         keys = ("panel", "hinge", "handle", "latch", "stem", "frame", "wall")

@@ -12,14 +12,14 @@ from kmn_sim.control.interpolation import State
 from kmn_sim.control.trajectory_controller import TrajectoryController
 from kmn_sim.robot.pr2_model import pr2_urdf
 from kmn_sim.robot.settings import RobotSettings
-from kmn_sim.robot.simulated_robot import Robot
+from kmn_sim.robot.simulated_robot import SimulatedRobot
 from kmn_sim.sensors.renderer import Renderer
 from kmn_sim.world.carton import Carton
 from kmn_sim.world.cuboids import Cuboid, door_cuboids, floor_cuboid, table_cuboids
 from kmn_sim.world.door import Door
 from kmn_sim.world.physics import Physics
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import BoxSettings, DoorSettings, PhysicsSettings
+from kmn_sim.world.settings import BoxSettings, DoorMechanics, PhysicsSettings
 
 
 class Simulation:
@@ -60,7 +60,7 @@ class Simulation:
         from_desired_state: bool = True,
     ) -> None:
         self._settings = PhysicsSettings.load()
-        self._door_settings, self._box_settings = DoorSettings.load(), BoxSettings.load()
+        self._door_settings, self._box_settings = DoorMechanics.load(), BoxSettings.load()
         self._robot_settings, self._urdf = RobotSettings.load(), pr2_urdf()
         self._from_desired_state = from_desired_state
         self.physics: Any = Physics(gui)
@@ -97,7 +97,7 @@ class Simulation:
         if scenario.table:
             self._stand(table_cuboids(self._box_settings))
         self.floor = -self._box_settings.table_height if scenario.table else 0.0
-        self.robot = Robot(
+        self.robot = SimulatedRobot(
             physics, self._urdf, self._robot_settings, base, self.floor, self.step_time
         )
         if scenario.floor:

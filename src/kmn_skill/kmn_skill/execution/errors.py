@@ -30,7 +30,7 @@ class StatesError(SkillError):
 
 
 class ExecutionError(SkillError):
-    """Robot or door do not follow the plan; another attempt may help."""
+    """RobotModel or door do not follow the plan; another attempt may help."""
 
 
 class CancelledError(SkillError):

@@ -21,7 +21,7 @@ MAX_FRAMES = 100  # that are kept
 
 
 @dataclass(frozen=True)
-class DoorSettings:
+class AcceptanceSettings:
     """What is asked of the door's parameters.
 
     Attributes
@@ -51,7 +51,7 @@ class DoorSettings:
     limit_margin: float
 
 
-class Observation(NamedTuple):
+class DoorObservation(NamedTuple):
     """Morphing parameters as they came.
 
     Attributes
@@ -149,14 +149,14 @@ class PerceivedDoor:
         May be replaced.
     """
 
-    def __init__(self, model: KinematicModel, frame: str, settings: DoorSettings) -> None:
+    def __init__(self, model: KinematicModel, frame: str, settings: AcceptanceSettings) -> None:
         self._model, self._frame, self.settings = model, frame, settings
         self._lock = threading.Lock()
-        self._kept: deque[Observation] = deque(maxlen=MAX_FRAMES)
+        self._kept: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)
         self._refused: DoorError | None = None  # the last one
         self._since = -math.inf  # seconds; what was seen before was another world
 
-    def add(self, observation: Observation) -> None:
+    def add(self, observation: DoorObservation) -> None:
         """Keep an observation; one that is not usable parts those before from those after.
 
         Raises
@@ -224,7 +224,7 @@ class PerceivedDoor:
         self._check_certainty(values, np.mean([each.covariance for each in kept], axis=0))
         return values
 
-    def _check(self, observation: Observation) -> None:
+    def _check(self, observation: DoorObservation) -> None:
         """Raise if an observation is not usable at all."""
         model = self._model
         names = tuple(parameter.name for parameter in model.parameters)

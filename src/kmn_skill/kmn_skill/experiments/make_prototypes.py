@@ -17,7 +17,7 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number
 from kmn_skill.planning.check import PlanRejected
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.policy import PHASES
+from kmn_skill.planning.policy import PHASE_COUNT
 from kmn_skill.planning.prototypes import PULL, PUSH
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.solver import Solver
@@ -32,7 +32,7 @@ def key_frame(request: PlanRequest, generator: np.random.Generator) -> NDArray[n
     """Return a guess (T + 1, 13): drive before the door, hold a random posture, follow the door."""
     settings = SkillSettings.load()
     slices = settings.planner.coarse
-    times = np.arange(PHASES * slices + 1) / slices
+    times = np.arange(PHASE_COUNT * slices + 1) / slices
     path = np.zeros((len(times), 13))
     posture = request.start.copy()
     posture[:3] = settings.policy.base[0], -0.5, 0.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.clearance import Surface, clearance
 from kmn_skill.planning.plan import RELEASE, Phase, Plan, PlanReport, PlanRequest
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.timing import peaks
 from kmn_skill.planning.transfer import hermite
@@ -40,7 +40,7 @@ def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanR
     PlanRejected
         If it does not fulfil what ``config/skill/door.yaml`` demands.
     """
-    settings, robot = SkillSettings.load(), Robot.load()
+    settings, robot = SkillSettings.load(), RobotModel.load()
     if world is None:
         model = KinematicModel.load("door")
         world = World(model, request.theta, request.gamma, robot, settings.grasp)
@@ -82,7 +82,7 @@ def _check_start(plan: Plan, request: PlanRequest, tolerance: float) -> None:
         raise PlanRejected(f"it starts {error:.3g} away from the present state")
 
 
-def _check_motion(plan: Plan, robot: Robot, world: World) -> None:
+def _check_motion(plan: Plan, robot: RobotModel, world: World) -> None:
     """Check order of times, limits of positions, velocities and accelerations, and the end."""
     steps = np.diff(plan.times)
     if plan.times[0] != 0.0 or steps.min() <= 0.0:
@@ -150,7 +150,7 @@ def _contact_error(path: NDArray[np.float64], world: World) -> float:
 
 @cache
 def _surfaces() -> dict[str, Surface]:
-    return surfaces(Robot.load(), SkillSettings.load().check.spacing)
+    return surfaces(RobotModel.load(), SkillSettings.load().check.spacing)
 
 
 def _clearance(
@@ -164,7 +164,7 @@ def _clearance(
         Configurations up to which the gripper lets go of the handle, and from which on it closes
         about it.
     """
-    own = boxes(Robot.load())
+    own = boxes(RobotModel.load())
     around = world.door_boxes(SkillSettings.load().check.stem)
     around.update({name: own[name] for name in OBSTACLES})
     parts = _surfaces()

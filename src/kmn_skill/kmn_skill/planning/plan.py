@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-PHASES = ("reach", "grasp", "press", "open")
+PHASE_NAMES = ("reach", "grasp", "press", "open")
 RELEASE = "release"  # comes before them if the hand is at the handle
 
 

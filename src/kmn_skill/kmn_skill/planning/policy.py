@@ -14,11 +14,11 @@ import robotic as ry
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import PolicySettings
 from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, door_body
 
-PHASES = 4
+PHASE_COUNT = 4
 COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
 
 
@@ -52,7 +52,7 @@ class Policy:
     def __init__(
         self,
         world: World,
-        robot: Robot,
+        robot: RobotModel,
         request: PlanRequest,
         settings: PolicySettings,
         slices: int,
@@ -60,7 +60,7 @@ class Policy:
     ) -> None:
         self._world, self._robot, self._settings = world, robot, settings
         world.configuration.setJointState([*request.start, *request.door_start])
-        self.problem: Any = ry.KOMO(world.configuration, PHASES, slices, 2, False)
+        self.problem: Any = ry.KOMO(world.configuration, PHASE_COUNT, slices, 2, False)
         self._step = 1.0 / slices
         self._add_costs(request)
         self._add_equalities(request)
@@ -142,7 +142,7 @@ def pairs(settings: PolicySettings, world: World) -> list[Pair]:
     door = [(body, panel) for body in settings.door_collisions]
     door += [(body, handle) for body in settings.handle_collisions]
     own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
-    always = [Pair(*names, 0.0, float(PHASES)) for names in (*door, *own)]
+    always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*door, *own)]
     return always + [Pair(body, handle, 0.0, 1.0) for body in settings.approach_collisions]
 
 
@@ -163,7 +163,7 @@ def near_pairs(
     for row, positions in zip(distances, path, strict=True):
         world.configuration.setJointState(positions)
         row[:] = [-world.configuration.eval(ry.FS.negDistance, pair[:2])[0][0] for pair in pairs]
-    step = PHASES / len(path)
+    step = PHASE_COUNT / len(path)
     kept = []
     for pair, distance in zip(pairs, distances.T, strict=True):
         close = np.flatnonzero(distance < near)

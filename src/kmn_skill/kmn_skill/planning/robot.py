@@ -48,7 +48,7 @@ class Pad(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class RobotModel:
     """What the planner knows of the PR2 beside its model.
 
     Attributes
@@ -90,7 +90,7 @@ class Robot:
 
     @classmethod
     @cache
-    def load(cls) -> Robot:
+    def load(cls) -> RobotModel:
         """Read the configuration file."""
         section = Section.load(resources.find("config/skill", "pr2"))
         section.allow(

@@ -15,7 +15,7 @@ from kmn_skill.planning.check import PlanRejected, check
 from kmn_skill.planning.plan import Plan, PlanRequest
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
 from kmn_skill.planning.release import release
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.timing import preceded, timed_plan
 from kmn_skill.planning.transfer import refine, transfer
@@ -26,7 +26,7 @@ class Solver:
     """Solves the policy; what does not depend on the request is loaded once."""
 
     def __init__(self) -> None:
-        self._settings, self._robot = SkillSettings.load(), Robot.load()
+        self._settings, self._robot = SkillSettings.load(), RobotModel.load()
         self.model = KinematicModel.load("door")
         self.world(np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma)))
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.planning.plan import PHASES, RELEASE, Phase, Plan, PlanReport, PlanRequest
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.plan import PHASE_NAMES, RELEASE, Phase, Plan, PlanReport, PlanRequest
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import TimingSettings
 
 UNCHECKED = PlanReport(np.inf, -np.inf, np.nan, np.nan, np.nan, np.nan, "")
 
 
 def timed_plan(
-    path: NDArray[np.float64], request: PlanRequest, robot: Robot, settings: TimingSettings
+    path: NDArray[np.float64], request: PlanRequest, robot: RobotModel, settings: TimingSettings
 ) -> Plan:
     """Return the plan that follows a path; it is not checked yet.
 
@@ -42,13 +42,15 @@ def timed_plan(
     positions[grasp + 1 :, -1] = np.maximum(nodes[grasp + 1 :, 10] - settings.squeeze, 0.0)
     velocities[grasp + 1 :, -1] = 0.0
     borders = ((0, grasp), (grasp, grasp + 1), (grasp + 1, pressed), (pressed, end))
-    phases = tuple(Phase(name, *border) for name, border in zip(PHASES, borders, strict=True))
+    phases = tuple(Phase(name, *border) for name, border in zip(PHASE_NAMES, borders, strict=True))
     return Plan(
         robot.joint_names, times, positions, velocities, nodes[:, 11:].copy(), phases, UNCHECKED
     )
 
 
-def preceded(plan: Plan, path: NDArray[np.float64], robot: Robot, settings: TimingSettings) -> Plan:
+def preceded(
+    plan: Plan, path: NDArray[np.float64], robot: RobotModel, settings: TimingSettings
+) -> Plan:
     """Return a plan that first lets go of the handle.
 
     Parameters

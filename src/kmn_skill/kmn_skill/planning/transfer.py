@@ -9,7 +9,7 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.transformation import rotation_z
 from kmn_skill.planning.kinematics import turn
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.policy import PHASES
+from kmn_skill.planning.policy import PHASE_COUNT
 
 
 def transfer(
@@ -38,7 +38,7 @@ def transfer(
         closing = np.linalg.inv(turn(hinge, prototype, before[11]))
         opening = turn(hinge, request.gamma, after[11])
         after[:3] = move_base(before[:3], pose @ opening @ shift @ closing)
-    phase = (len(path) - 1) // PHASES
+    phase = (len(path) - 1) // PHASE_COUNT
     fading = np.clip(1.0 - np.arange(len(path)) / phase, 0.0, 1.0)[:, None]
     guess[:, :11] += fading**2 * (3.0 - 2.0 * fading) * (request.start - guess[0, :11])
     return guess[1:]
@@ -67,7 +67,7 @@ def refine(
     slices
         Configurations a phase of the result.
     """
-    coarse = len(path) // PHASES
+    coarse = len(path) // PHASE_COUNT
     nodes = np.vstack([start, path])
     reach = _resampled(nodes[: 2 * coarse + 1], 2 * slices + 1)[1:]
     press = _resampled(nodes[2 * coarse + 1 : 3 * coarse + 1], slices)

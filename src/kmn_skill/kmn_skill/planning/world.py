@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rotation import quaternion_from_matrix
 from kmn_skill.planning.clearance import Box, Surface, sample_surface
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import GraspSettings
 
 PADS, CONTACTS = ("left_pad", "right_pad"), ("left_contact", "right_contact")
@@ -32,7 +32,7 @@ def door_body(name: str) -> str:
 
 
 class World:
-    """Robot and door m(theta, gamma) in a configuration of the package robotic.
+    """RobotModel and door m(theta, gamma) in a configuration of the package robotic.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class World:
         model: KinematicModel,
         theta: NDArray[np.float64],
         gamma: NDArray[np.float64],
-        robot: Robot,
+        robot: RobotModel,
         grasp: GraspSettings,
     ) -> None:
         self.joint_names = (*robot.joint_names, *(joint.name for joint in model.joints))
@@ -119,7 +119,7 @@ class World:
         self,
         model: KinematicModel,
         gamma: NDArray[np.float64],
-        robot: Robot,
+        robot: RobotModel,
         grasp: GraspSettings,
     ) -> None:
         """Add the two points of the gripper, those of the handle, and the frames between them."""
@@ -152,7 +152,7 @@ class World:
         return float(low)
 
 
-def boxes(robot: Robot) -> dict[str, Box]:
+def boxes(robot: RobotModel) -> dict[str, Box]:
     """Return the box about the meshes of each body of the robot, in its joint's frame."""
     found = {}
     for name, (vertices, _) in _meshes(robot).items():
@@ -161,7 +161,7 @@ def boxes(robot: Robot) -> dict[str, Box]:
     return found
 
 
-def surfaces(robot: Robot, spacing: float) -> dict[str, Surface]:
+def surfaces(robot: RobotModel, spacing: float) -> dict[str, Surface]:
     """Return points on the meshes of each body of the robot, ``spacing`` apart (m)."""
     return {
         name: Surface.of(robot.bodies[name].joint, sample_surface(vertices, triangles, spacing))
@@ -170,7 +170,7 @@ def surfaces(robot: Robot, spacing: float) -> dict[str, Surface]:
 
 
 @cache
-def _meshes(robot: Robot) -> dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]:
+def _meshes(robot: RobotModel) -> dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]:
     """Return vertices (V, 3) and triangles (F, 3) of each body, in its joint's frame."""
     source = _source(robot)
     found = {}
@@ -194,13 +194,13 @@ def _meshes(robot: Robot) -> dict[str, tuple[NDArray[np.float64], NDArray[np.int
 
 
 @cache
-def _source(robot: Robot) -> Any:
+def _source(robot: RobotModel) -> Any:
     source = ry.Config()
     source.addFile(ry.raiPath(robot.source))
     return source
 
 
-def _add_robot(configuration: Any, robot: Robot) -> None:
+def _add_robot(configuration: Any, robot: RobotModel) -> None:
     """Add the robot's joints and a box about each of its bodies."""
     source = _source(robot)
     joints = [*robot.model_joints, *robot.followers]
@@ -220,7 +220,7 @@ def _add_robot(configuration: Any, robot: Robot) -> None:
         _add(configuration, name, box.frame, box.centre).setShape(ry.ST.ssBox, [*box.size, radius])
 
 
-def _add_joint(configuration: Any, frame: Any, robot: Robot) -> None:
+def _add_joint(configuration: Any, frame: Any, robot: RobotModel) -> None:
     attributes: Mapping[str, Any] = frame.getAttributes()
     joint = configuration.addFrame(frame.name, f"{frame.name}_origin")
     options: dict[str, Any] = {"scale": attributes.get("joint_scale", 1.0)}

@@ -22,7 +22,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import MessageError, cube_marker
 from kmn_skill.execution.opening import SUCCESS, Result
-from kmn_skill.execution.perceived_door import Observation
+from kmn_skill.execution.perceived_door import DoorObservation
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import Sample
 from kmn_skill.planning.kinematics import moved_cubes
@@ -45,14 +45,14 @@ def stamp_of(time: float) -> TimeMessage:
     return Time(nanoseconds=round(time / NANO)).to_msg()
 
 
-def observation_from_message(message: MorphingParameters) -> Observation:
+def observation_from_message(message: MorphingParameters) -> DoorObservation:
     """Read morphing parameters, be they valid or not."""
     values = np.array([*message.theta, *message.gamma], dtype=np.float64)
     covariance = np.array(message.covariance, dtype=np.float64)
     if covariance.size == values.size**2:
         covariance = covariance.reshape(values.size, values.size)
     valid = message.status == MorphingParameters.OK
-    return Observation(
+    return DoorObservation(
         time=seconds(message.header.stamp),
         model=message.model,
         frame=message.header.frame_id,

@@ -38,9 +38,9 @@ from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import StateWatch
 from kmn_skill.planning.plan import Plan
 from kmn_skill.planning.planner import Planner
-from kmn_skill.planning.robot import Robot
+from kmn_skill.planning.robot import RobotModel
 from kmn_skill.ros import messages
-from kmn_skill.ros.skill_node_parameters import DESCRIPTORS, NodeSettings
+from kmn_skill.ros.skill_node_parameters import DESCRIPTORS, SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics
 
 FEEDBACK_PERIOD = 0.1  # seconds
@@ -60,10 +60,10 @@ class SkillNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
-        self._settings = settings = NodeSettings.check(
+        self._settings = settings = SkillNodeSettings.check(
             declare_parameters(self, "skill_node", DESCRIPTORS)
         )
-        robot_joints = Robot.load().joint_names
+        robot_joints = RobotModel.load().joint_names
         self._joints = {
             "joint_states": robot_joints,
             "door_state": tuple(joint.name for joint in settings.model.joints),
@@ -252,7 +252,7 @@ class SkillNode(Node):
         A goal that runs goes on with those that it began with.
         """
         try:
-            settings = NodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = SkillNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings

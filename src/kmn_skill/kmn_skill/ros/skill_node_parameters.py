@@ -11,7 +11,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.parameters import ParameterError, anything, pick, real, whole
 from kmn_skill.execution.opening import OpeningSettings
-from kmn_skill.execution.perceived_door import MAX_FRAMES, DoorSettings
+from kmn_skill.execution.perceived_door import MAX_FRAMES, AcceptanceSettings
 from kmn_skill.execution.plan_execution import ExecutionSettings
 from kmn_skill.execution.states import StateSettings
 from kmn_skill.planning.settings import SkillSettings
@@ -20,7 +20,7 @@ JOINTS = 2  # hinge and handle
 
 
 @dataclass(frozen=True, eq=False)
-class NodeSettings:
+class SkillNodeSettings:
     """All parameters of skill_node, checked.
 
     Attributes
@@ -38,13 +38,13 @@ class NodeSettings:
     model: KinematicModel
     world_frame: str
     skill: SkillSettings
-    door: DoorSettings
+    door: AcceptanceSettings
     states: StateSettings
     execution: ExecutionSettings
     opening: OpeningSettings
 
     @classmethod
-    def check(cls, values: Mapping[str, Any]) -> NodeSettings:
+    def check(cls, values: Mapping[str, Any]) -> SkillNodeSettings:
         """Check the parameters' values, by name, one by one and together.
 
         Raises
@@ -66,7 +66,7 @@ class NodeSettings:
             model=model,
             world_frame=values["world_frame"],
             skill=replace(skill, planner=planner),
-            door=pick(DoorSettings, values),
+            door=pick(AcceptanceSettings, values),
             states=pick(StateSettings, values),
             execution=pick(ExecutionSettings, values),
             opening=pick(OpeningSettings, values),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from pydantic import Field
 
+from kmn_perception.configuration.settings import Fraction, NonNegative
 from kmn_perception.refinement.image import may_hide
 from kmn_perception.refinement.view import raycast
 
@@ -35,12 +37,12 @@ class EdgeSettings(NamedTuple):
         Of the probability, where nothing was measured.
     """
 
-    occluder: float
-    background: float
-    contrast: float
-    floor_margin: float
-    outliers: float
-    interpolated: float
+    occluder: NonNegative
+    background: NonNegative
+    contrast: NonNegative
+    floor_margin: NonNegative
+    outliers: Annotated[float, Field(gt=0.0, lt=0.5)]
+    interpolated: Fraction
 
 
 @njit(cache=True, error_model="numpy")

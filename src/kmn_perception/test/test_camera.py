@@ -1,7 +1,9 @@
 """Cameras: the author's poses, and resizing that keeps the view."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -59,3 +61,20 @@ def test_wrong_files_are_refused(tmp_path: Path, key: str, value: object, messag
     file.write_text(yaml.safe_dump(content))
     with pytest.raises(ConfigurationError, match=message):
         Camera.load(file)
+
+
+def test_points_are_projected_as_opencv_does() -> None:
+    rng = np.random.default_rng(0)
+    camera = replace(Camera.load("door"), fy=400.0, cx=300.5)
+    points = rng.uniform(-1.0, 1.0, (5, 7, 3))
+    to_camera = camera.world_to_camera
+    rotation, _ = cv2.Rodrigues(to_camera[:3, :3])
+    expected, _ = cv2.projectPoints(
+        points.reshape(-1, 3), rotation, to_camera[:3, 3], camera.matrix, np.zeros(4)
+    )
+    pixels = camera.project(points)
+    np.testing.assert_allclose(pixels[..., :2].reshape(-1, 2), expected[:, 0], atol=1e-9)
+    seen = points @ to_camera[:3, :3].T + to_camera[:3, 3]
+    np.testing.assert_allclose(pixels[..., 2], seen[..., 2], atol=1e-12)
+    rays = camera.rays(pixels[..., 0], pixels[..., 1])
+    np.testing.assert_allclose(rays * pixels[..., 2:], seen, atol=1e-12)

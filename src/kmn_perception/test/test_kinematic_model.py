@@ -115,3 +115,17 @@ def test_text_that_is_not_yaml_is_refused(tmp_path: Path) -> None:
     file.write_text("theta: [")
     with pytest.raises(ConfigurationError, match="mine.yaml: not YAML"):
         KinematicModel.load(file)
+
+
+def test_the_stem_joins_lever_and_panel_at_the_axis_of_the_lever() -> None:
+    model = KinematicModel.load("door")
+    assert model.stem is not None
+    gamma = [0.1, -0.1, 0.03, -0.05]
+    centre, size = model.stem.cuboid(gamma)
+    lever, panel = model.body("handle"), model.body("panel")
+    near, far = centre - size / 2.0, centre + size / 2.0
+    assert near[0] == pytest.approx(lever.centre(gamma)[0] + lever.size(gamma)[0] / 2.0)
+    assert far[0] == pytest.approx(panel.centre(gamma)[0] - panel.size(gamma)[0] / 2.0)
+    assert centre[2] == pytest.approx(model.joints[1].origin(gamma)[2])
+    # The axis lies at the lever's end, beyond which the stem does not stick out.
+    assert near[1] == pytest.approx((lever.centre(gamma) - lever.size(gamma) / 2.0)[1])

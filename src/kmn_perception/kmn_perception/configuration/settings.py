@@ -18,6 +18,7 @@ Settings = TypeVar("Settings")
 WORDS = {  # of pydantic, and of those who write YAML
     "Input should be": "must be",
     "Arguments must be an array or an object": "must be keys and values",
+    "an array or an object": "keys and values",
     "Value error,": "is wrong:",
     "a valid integer": "a whole number",
     "a valid number": "a number",

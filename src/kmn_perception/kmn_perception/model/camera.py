@@ -84,6 +84,48 @@ class Camera:
         """(4, 4) transformation from the world frame to the optical frame."""
         return np.linalg.inv(self.pose).astype(np.float64)
 
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """(3,) where it stands in the world frame, metres."""
+        return self.pose[:3, 3]
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(3, 3) camera matrix K, which maps the optical frame to pixels z (u, v, 1)."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def projection(self) -> NDArray[np.float64]:
+        """(3, 4) map from the world frame to homogeneous pixels z (u, v, 1)."""
+        return self.matrix @ self.world_to_camera[:3]
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Project points onto the image.
+
+        Parameters
+        ----------
+        points
+            (..., 3) world frame, metres.
+
+        Returns
+        -------
+        pixels
+            (..., 3) columns u, rows v, and depths z along the optical axis in metres; where z is
+            not positive the point lies behind the camera, and u and v mean nothing.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        matrix = self.projection
+        pixels = points @ matrix[:, :3].T + matrix[:, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pixels[..., :2] /= pixels[..., 2:]
+        return pixels
+
+    def rays(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Return the directions (..., 3) through pixels (...), of depth 1, in the optical frame."""
+        x = (np.asarray(u, dtype=np.float64) - self.cx) / self.fx
+        y = (np.asarray(v, dtype=np.float64) - self.cy) / self.fy
+        return np.stack([x, y, np.ones_like(x)], axis=-1)
+
 
 def look_at(position: ArrayLike, target: ArrayLike) -> NDArray[np.float64]:
     """Return the pose (4, 4) of an upright optical frame at ``position`` that faces ``target``."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,80 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section, is_number
+from kmn_perception.configuration.section import Section
+from kmn_perception.model import model_file
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.transformation import AXES, KINDS, Transformation
+from kmn_perception.model.parts import Body, Joint, NetworkInput, Parameter, Stem
+from kmn_perception.model.transformation import Transformation
 
-UNITS = {"translation": "m", "rotation": "rad", "scale": ""}
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A morphing parameter: its name, unit (m, rad or none) and limits; the prototype is at 0."""
-
-    name: str
-    unit: str
-    limits: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """A vector that is linear in gamma: ``constant + slope @ gamma``."""
-
-    constant: NDArray[np.float64]  # (3,)
-    slope: NDArray[np.float64]  # (3, m)
-
-    def __call__(self, gamma: ArrayLike) -> NDArray[np.float64]:
-        """Return the vector (3,) at gamma (m,)."""
-        return self.constant + self.slope @ np.asarray(gamma, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Body:
-    """A cuboid in the object frame: centre and size in metres."""
-
-    name: str
-    centre: Linear
-    size: Linear
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A revolute joint in the object frame; ``parent`` is a body or ``world``."""
-
-    name: str
-    body: str
-    parent: str
-    axis: tuple[float, ...]
-    origin: Linear
-    limits: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class NetworkInput:
-    """The depth image that the network sees.
-
-    Attributes
-    ----------
-    width, height
-        Size in pixels.
-    near, far
-        Depths in metres that become 1 and (almost) 0; 0 itself is the background.
-    contrast
-        Factor by which the network stretches depths about 1/2.
-    supersampling
-        The cloud is splatted on a grid this many times finer, then averaged.
-    max_gap
-        Holes of up to this many pixels of the finer grid are closed.
-    """
-
-    width: int
-    height: int
-    near: float
-    far: float
-    contrast: float
-    supersampling: int
-    max_gap: int
+_TURNED = (("rotation", "z"), ("scale", "x"), ("scale", "y"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +29,8 @@ class KinematicModel:
         Transformation and configuration parameters; all are 0 at the prototype.
     transformation
         T_theta of the transformation parameters.
+    stem
+        What joins a body to its parent, if there is such a thing.
     camera
         The canonical camera, from which the network sees the world.
     start
@@ -113,6 +46,7 @@ class KinematicModel:
     transformation: Transformation
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
+    stem: Stem | None
     camera: Camera
     input: NetworkInput
     start: str
@@ -133,10 +67,10 @@ class KinematicModel:
         section = Section.load(resources.find("config/models", name_or_path))
         section.allow(
             ("name", "camera", "input", "theta", "bodies"),
-            ("gamma", "joints", "start", "symmetry"),
+            ("gamma", "joints", "stem", "start", "symmetry"),
         )
-        theta = tuple(_theta(entry) for entry in section.sections("theta"))
-        gamma = tuple(_gamma(entry) for entry in section.sections("gamma"))
+        theta = tuple(model_file.read_theta(entry) for entry in section.sections("theta"))
+        gamma = tuple(model_file.read_gamma(entry) for entry in section.sections("gamma"))
         names = [parameter.name for parameter in (*theta, *gamma)]
         if not theta or len(set(names)) != len(names):
             raise section.error(f"'theta' must be there and names must differ, found {names}")
@@ -148,16 +82,18 @@ class KinematicModel:
             )
         except ValueError as error:
             raise section.error(f"theta: {error}") from error
-        bodies = _bodies(section, gamma)
+        bodies = model_file.read_bodies(section, gamma)
+        joints = model_file.read_joints(section, bodies, gamma)
         model = cls(
             name=section.text("name"),
             theta=theta,
             gamma=gamma,
             transformation=transformation,
             bodies=bodies,
-            joints=_joints(section, bodies, gamma),
+            joints=joints,
+            stem=model_file.read_stem(section, bodies, joints),
             camera=Camera.load(section.text("camera")),
-            input=_input(section.section("input")),
+            input=model_file.read_input(section.section("input")),
             start=section.text("start", ("prototype", "centroid"), "prototype"),
             symmetry=section.text("symmetry", ("none", "quarter_turn"), "none"),
         )
@@ -173,6 +109,20 @@ class KinematicModel:
     def limits(self) -> NDArray[np.float64]:
         """(n + m, 2) lower and upper limits of (theta, gamma)."""
         return np.array([parameter.limits for parameter in self.parameters])
+
+    @cached_property
+    def prototype(self) -> NDArray[np.float64]:
+        """(n + m,) parameters (theta, gamma) of the prototype: all 0."""
+        return np.zeros(len(self.parameters))
+
+    @cached_property
+    def prototype_cubes(self) -> NDArray[np.float64]:
+        """(B, 4, 4) bodies of the prototype, see `unit_cubes`."""
+        return self.unit_cubes(*self.split(self.prototype))
+
+    def body(self, name: str) -> Body:
+        """Return the body of a name."""
+        return next(body for body in self.bodies if body.name == name)
 
     def split(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Split (theta, gamma) (..., n + m) into theta (..., n) and gamma (..., m)."""
@@ -218,100 +168,6 @@ class KinematicModel:
         swapped = (turns % 2 == 1)[..., None]
         nearest[..., [sx, sy]] = np.where(swapped, values[..., [sy, sx]], values[..., [sx, sy]])
         return nearest
-
-
-_TURNED = (("rotation", "z"), ("scale", "x"), ("scale", "y"))
-
-
-def _theta(section: Section) -> Parameter:
-    section.allow(("name", "kind", "axis", "limits"))
-    kind = section.text("kind", KINDS)
-    section.text("axis", AXES)
-    limits = section.limits("limits")
-    if kind == "scale" and limits[0] <= -1.0:
-        raise section.error(f"a scale stretches by 1 + s, so 'limits' must lie above -1: {limits}")
-    return Parameter(section.text("name"), UNITS[kind], limits)
-
-
-def _gamma(section: Section) -> Parameter:
-    section.allow(("name", "unit", "limits"))
-    return Parameter(
-        section.text("name"), section.text("unit", ("m", "rad", "")), section.limits("limits")
-    )
-
-
-def _linear(section: Section, key: str, gamma: Sequence[Parameter]) -> Linear:
-    entries = section.values.get(key)
-    if not isinstance(entries, list) or len(entries) != 3:
-        raise section.error(f"'{key}' must be a list of 3 entries, found {entries!r}")
-    names = [parameter.name for parameter in gamma]
-    constant, slope = np.zeros(3), np.zeros((3, len(names)))
-    for row, entry in enumerate(entries):
-        terms = entry if isinstance(entry, Mapping) else {"constant": entry}
-        for name, value in terms.items():
-            if not is_number(value):
-                raise section.error(f"'{key}' must hold numbers, found {value!r}")
-            if name == "constant":
-                constant[row] = value
-            elif name in names:
-                slope[row, names.index(name)] = value
-            else:
-                known = ", ".join(("constant", *names))
-                raise section.error(f"unknown key '{name}' in '{key}' (known: {known})")
-    return Linear(constant, slope)
-
-
-def _bodies(section: Section, gamma: Sequence[Parameter]) -> tuple[Body, ...]:
-    bodies = []
-    for name in section.section("bodies").values:
-        body = section.section("bodies").section(name)
-        body.allow(("centre", "size"))
-        size = _linear(body, "size", gamma)
-        for corner in itertools.product(*[parameter.limits for parameter in gamma]):
-            if size(corner).min() <= 0.0:
-                raise body.error(
-                    f"'size' must be positive within the limits, "
-                    f"is {size(corner)} at gamma {corner}"
-                )
-        bodies.append(Body(name, _linear(body, "centre", gamma), size))
-    if not bodies:
-        raise section.error("'bodies' is empty")
-    return tuple(bodies)
-
-
-def _joints(
-    section: Section, bodies: Sequence[Body], gamma: Sequence[Parameter]
-) -> tuple[Joint, ...]:
-    names = [body.name for body in bodies]
-    joints = []
-    for name in section.section("joints").values:
-        joint = section.section("joints").section(name)
-        joint.allow(("body", "parent", "axis", "origin", "limits"))
-        joints.append(
-            Joint(
-                name=name,
-                body=joint.text("body", names),
-                parent=joint.text("parent", ("world", *names)),
-                axis=tuple(joint.numbers("axis", 3)),
-                origin=_linear(joint, "origin", gamma),
-                limits=joint.limits("limits"),
-            )
-        )
-    return tuple(joints)
-
-
-def _input(section: Section) -> NetworkInput:
-    section.allow(("width", "height", "near", "far", "contrast", "supersampling", "max_gap"))
-    near = section.number("near", 0.0, 1e3)
-    return NetworkInput(
-        width=section.whole_number("width", 32, 4096),
-        height=section.whole_number("height", 32, 4096),
-        near=near,
-        far=section.number("far", near, 1e3),
-        contrast=section.number("contrast", 1.0, 1e3),
-        supersampling=section.whole_number("supersampling", 1, 8),
-        max_gap=section.whole_number("max_gap", 0, 64),
-    )
 
 
 def _check_symmetry(section: Section, model: KinematicModel) -> None:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kmn_perception.model.kinematic_model import Joint
+from kmn_perception.model.parts import Joint
 from kmn_sim.world.cuboids import Cuboid
 from kmn_sim.world.scenario import Scenario
 

@@ -11,7 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import Joint, KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.parts import Joint
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.errors import (
     CancelledError,

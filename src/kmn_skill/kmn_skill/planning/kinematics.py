@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import Joint, KinematicModel
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.parts import Joint
 from kmn_perception.model.rotation import matrix_from_quaternion
 
 

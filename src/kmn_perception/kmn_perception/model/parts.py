@@ -1,0 +1,109 @@
+"""What a kinematic model consists of: parameters, bodies, joints; sizes and places in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A morphing parameter: its name, unit (m, rad or none) and limits; the prototype is at 0."""
+
+    name: str
+    unit: str
+    limits: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A vector that is linear in gamma: ``constant + slope @ gamma``."""
+
+    constant: NDArray[np.float64]  # (3,)
+    slope: NDArray[np.float64]  # (3, m)
+
+    def __call__(self, gamma: ArrayLike) -> NDArray[np.float64]:
+        """Return the vector (3,) at gamma (m,)."""
+        return self.constant + self.slope @ np.asarray(gamma, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A cuboid in the object frame: centre and size in metres."""
+
+    name: str
+    centre: Linear
+    size: Linear
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A revolute joint in the object frame; ``parent`` is a body or ``world``."""
+
+    name: str
+    body: str
+    parent: str
+    axis: tuple[float, ...]
+    origin: Linear
+    limits: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Stem:
+    """What joins a body to its parent at its joint: a square bar along x from face to face.
+
+    The paper's model leaves it out, so that it is neither rendered nor fitted; it can be touched.
+
+    Attributes
+    ----------
+    joint
+        Of the body; the stem lies on its axis.
+    body, parent
+        The two that it joins.
+    thickness
+        Of the bar, metres.
+    """
+
+    joint: Joint
+    body: Body
+    parent: Body
+    thickness: float
+
+    def cuboid(self, gamma: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return centre and size (3,) at gamma (m,), metres in the object frame."""
+        centre, half = self.body.centre(gamma), self.body.size(gamma) / 2.0
+        start = centre[0] + half[0]
+        end = self.parent.centre(gamma)[0] - self.parent.size(gamma)[0] / 2.0
+        slack = half - self.thickness / 2.0
+        pivot = np.clip(self.joint.origin(gamma), centre - slack, centre + slack)
+        size = np.array([end - start, self.thickness, self.thickness])
+        return np.array([(start + end) / 2.0, *pivot[1:]]), size
+
+
+@dataclass(frozen=True)
+class NetworkInput:
+    """The depth image that the network sees.
+
+    Attributes
+    ----------
+    width, height
+        Size in pixels.
+    near, far
+        Depths in metres that become 1 and (almost) 0; 0 itself is the background.
+    contrast
+        Factor by which the network stretches depths about 1/2.
+    supersampling
+        The cloud is splatted on a grid this many times finer, then averaged.
+    max_gap
+        Holes of up to this many pixels of the finer grid are closed.
+    """
+
+    width: int
+    height: int
+    near: float
+    far: float
+    contrast: float
+    supersampling: int
+    max_gap: int

@@ -155,13 +155,14 @@ class MorphEstimator:
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
-        model = self.model
-        prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
-        points = depth_to_cloud(render(prototype, model.camera), model.camera)
-        self.estimate(Observation(points, model.camera))
+        camera = self.model.camera
+        depth = render(self.model.prototype_cubes, camera)
+        points = depth_to_cloud(depth, camera)
+        self.estimate(Observation(points, camera))
+        self.estimate(Observation(points, camera, depth=depth))
 
     def estimate(self, observation: Observation) -> Estimate:
-        """Estimate the morphing parameters of an object, of which alone the points are."""
+        """Estimate the morphing parameters of an object from points that show nothing else."""
         return self.estimate_all([observation])[0]
 
     def estimate_all(self, observations: Sequence[Observation]) -> list[Estimate]:
@@ -237,7 +238,8 @@ class MorphEstimator:
         for parameter, value, slack in zip(self.model.parameters, values, margin, strict=True):
             low, high = parameter.limits
             if not low - slack <= value <= high + slack:
-                reason = f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]"
+                unit = f" {parameter.unit}" if parameter.unit else ""
+                reason = f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]{unit}"
                 return Status.OUT_OF_LIMITS, reason
         if not residual <= settings.max_residual:
             return Status.NOT_CONVERGED, (

@@ -20,11 +20,12 @@ from std_msgs.msg import Header
 from kmn_perception.model.camera import Camera
 from kmn_perception.ros.messages import (
     MessageError,
+    camera_from_info,
     cloud_from_points,
     image_from_depth,
     info_from_camera,
     points_from_cloud,
-    points_from_depth,
+    view_from_image,
 )
 
 MAX_RANGE = 1000.0
@@ -83,6 +84,15 @@ def test_points_with_a_bad_coordinate_are_not_measured(bad: float, axis: int) ->
     assert points[1].tolist() == [4.0, 5.0, 6.0]
 
 
+def test_points_at_the_origin_are_not_measured() -> None:
+    """Several drivers write zeros where nothing was measured."""
+    rows = [[(0.0, 0.0, 0.0), (4.0, 5.0, 6.0)], [(1.0, 0.0, 2.0), (0.0, 0.0, 0.0)]]
+    points = points_from_cloud(pack_cloud(rows), MAX_RANGE)
+    np.testing.assert_array_equal(np.isnan(points[..., 0]), [[True, False], [False, True]])
+    with pytest.raises(MessageError, match="none of the 2 points was measured"):
+        points_from_cloud(pack_cloud([[(0.0, 0.0, 0.0)] * 2]), MAX_RANGE)
+
+
 def test_float64_beyond_float32_is_not_measured() -> None:
     points = points_from_cloud(pack_cloud([[(1e300, 0.0, 1.0), (4.0, 5.0, 6.0)]], "d"), MAX_RANGE)
     assert np.isnan(points[0]).all()
@@ -94,13 +104,14 @@ def test_float64_beyond_float32_is_not_measured() -> None:
         np.float32,
         st.tuples(st.integers(2, 5), st.integers(1, 5), st.just(3)),
         elements=st.floats(-100.0, 100.0, width=32),
-    )
+    ).filter(np.any)
 )
 def test_organised_points_survive_the_way_through_a_message(points: NDArray[np.float32]) -> None:
     message = deserialize_message(
         serialize_message(cloud_from_points(points, Header())), PointCloud2
     )
-    np.testing.assert_array_equal(points_from_cloud(message, MAX_RANGE), points)
+    expected = np.where((points == 0.0).all(axis=-1, keepdims=True), np.float32(NAN), points)
+    np.testing.assert_array_equal(points_from_cloud(message, MAX_RANGE), expected)
 
 
 def replaced(**values: Any) -> Callable[[Any], None]:
@@ -189,7 +200,9 @@ def camera_info(width: int = 2, height: int = 2) -> CameraInfo:
 def test_depth_is_deprojected_in_metres(
     encoding: str, rows: list[list[float]], order: str, pad: int
 ) -> None:
-    points = points_from_depth(pack_depth(rows, encoding, order, pad), camera_info(), MAX_RANGE)
+    points = view_from_image(
+        pack_depth(rows, encoding, order, pad), camera_info(), MAX_RANGE
+    ).points
     # x = (u - cx) z / fx, y = (v - cy) z / fy
     np.testing.assert_allclose(points[0, 0], [(0 - 0.5) * 0.5 / 4, (0 - 1) * 0.5 / 2, 0.5])
     np.testing.assert_allclose(points[1, 1], [(1 - 0.5) * 2.0 / 4, (1 - 1) * 2.0 / 2, 2.0])
@@ -200,15 +213,42 @@ def test_depth_is_deprojected_in_metres(
 @pytest.mark.parametrize("none", [0.0, -1.0, -INF, 1e9])
 def test_depth_that_cannot_be_is_not_measured(none: float) -> None:
     image = pack_depth([[none, 1.0], [1.0, 1.0]], "32FC1")
-    points = points_from_depth(image, camera_info(), MAX_RANGE)
+    points = view_from_image(image, camera_info(), MAX_RANGE).points
     assert np.isnan(points[0, 0]).all()
     assert np.isfinite(points[0, 1]).all()
+
+
+def test_depth_that_is_mostly_too_near_is_read() -> None:
+    """REP-117: -inf is nearer than the sensor measures, and no sign of a flipped axis."""
+    image = pack_depth([[-INF, -INF, -INF, 1.0]], "32FC1")
+    points = view_from_image(image, camera_info(4, 1), MAX_RANGE).points
+    np.testing.assert_array_equal(np.isfinite(points[0, :, 2]), [False, False, False, True])
+    flipped = pack_depth([[-1.0, -1.0, -2.0, INF]], "32FC1")
+    with pytest.raises(MessageError, match="most of the depth image is negative: z is flipped"):
+        view_from_image(flipped, camera_info(4, 1), MAX_RANGE)
+
+
+def test_region_of_interest_and_binning_are_applied() -> None:
+    """Every pixel of the small image sees what the pixels of the full one see on average."""
+    full = camera_info(8, 6)
+    part = camera_info(8, 6)
+    part.roi.x_offset, part.roi.y_offset, part.roi.width, part.roi.height = 2, 1, 4, 4
+    part.binning_x, part.binning_y = 2, 2
+    camera, small = camera_from_info(full), camera_from_info(part)
+    assert (small.width, small.height) == (2, 2)
+    for u, v in ((0, 0), (1, 1)):
+        columns, rows = np.meshgrid(2 + 2 * u + np.arange(2), 1 + 2 * v + np.arange(2))
+        np.testing.assert_allclose(small.rays(u, v), camera.rays(columns, rows).mean(axis=(0, 1)))
+    image = pack_depth([[1.0, 1.0], [1.0, 1.0]], "32FC1")
+    assert view_from_image(image, part, MAX_RANGE).camera is not None
+    with pytest.raises(MessageError, match="3 x 2 pixels, its camera_info 2 x 2 .of 8 x 6, after"):
+        view_from_image(pack_depth([[1.0] * 3] * 2, "32FC1"), part, MAX_RANGE)
 
 
 def test_projection_matrix_goes_before_camera_matrix() -> None:
     info = camera_info()
     info.p = [8.0, 0.0, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-    points = points_from_depth(pack_depth([[1.0, 1.0], [1.0, 1.0]], "32FC1"), info, MAX_RANGE)
+    points = view_from_image(pack_depth([[1.0, 1.0], [1.0, 1.0]], "32FC1"), info, MAX_RANGE).points
     np.testing.assert_allclose(points[1, 1], [1 / 8, 1 / 8, 1.0])
 
 
@@ -236,7 +276,7 @@ def test_malformed_depth_is_refused(
     spoil_image(image)
     spoil_info(info)
     with pytest.raises(MessageError, match=text) as error:
-        points_from_depth(image, info, MAX_RANGE)
+        view_from_image(image, info, MAX_RANGE)
     assert error.value.reason == reason
 
 
@@ -245,9 +285,9 @@ def test_depth_survives_the_way_through_messages(encoding: str, tolerance: float
     camera = Camera.load("kinect_v1").resized(8, 6)
     depth = np.linspace(0.4, 8.0, 48, dtype=np.float32).reshape(6, 8)
     depth[2, 3] = NAN
-    points = points_from_depth(
+    points = view_from_image(
         image_from_depth(depth, encoding, Header()), info_from_camera(camera, Header()), MAX_RANGE
-    )
+    ).points
     np.testing.assert_allclose(points[..., 2], depth, atol=tolerance, rtol=1e-6)
     u, v = 7, 5
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])

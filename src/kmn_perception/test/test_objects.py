@@ -15,6 +15,7 @@ from kmn_perception.model.camera import Camera, look_at
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.pipeline import ObjectEstimate
+from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import RealFrame, tabletop_pipeline
 
@@ -39,7 +40,7 @@ def unit_cube(box: Box) -> NDArray[np.float64]:
 def seen(depth: NDArray[np.float32]) -> list[ObjectEstimate]:
     """Return what is found in an exact depth image that a Kinect measures."""
     noisy = add_noise(depth, "kinect", np.random.default_rng(0))
-    return pipeline().estimate_all(depth_to_points(noisy, KINECT))
+    return pipeline().estimate_all(DepthView.of_depth(noisy, KINECT))
 
 
 def see(*boxes: Box) -> list[ObjectEstimate]:
@@ -58,7 +59,7 @@ def assert_is(found: ObjectEstimate, box: Box) -> None:
 def test_every_carton_of_a_real_frame_is_found_and_nothing_else(real_frame: RealFrame) -> None:
     labels = real_frame.labels
     measured = np.isfinite(real_frame.points[..., 2])
-    found = pipeline().estimate_all(real_frame.points)
+    found = pipeline().estimate_all(DepthView(real_frame.points))
     cartons = [label for label in (20, 30, 40) if (labels == label).any()]
     owners = []
     for one in found:
@@ -75,7 +76,7 @@ def test_every_carton_of_a_real_frame_is_found_and_nothing_else(real_frame: Real
 
 
 @pytest.mark.parametrize("yaw", [-0.5, 0.0, 0.4])
-def test_boxes_that_touch_are_parted_at_the_crease_between_them(yaw: float) -> None:
+def test_boxes_that_touch_are_divided_at_the_concave_edge_between_them(yaw: float) -> None:
     front = (0.0, -0.1, 0.05, 0.16, 0.1, 0.1, 0.0)
     back = (0.05, -0.05 + 0.06 / np.cos(yaw) + 0.12 * abs(np.sin(yaw)), 0.1, 0.3, 0.1, 0.2, yaw)
     found = see(front, back)
@@ -85,7 +86,7 @@ def test_boxes_that_touch_are_parted_at_the_crease_between_them(yaw: float) -> N
     np.testing.assert_allclose(heights, [0.1, 0.2], atol=0.004)
 
 
-def test_a_single_box_is_never_parted() -> None:
+def test_a_single_box_is_never_divided() -> None:
     for yaw in np.linspace(0.0, np.pi / 2, 5):
         box = (0.0, 0.0, 0.1, 0.25, 0.1, 0.2, float(yaw))
         found = see(box)
@@ -93,7 +94,7 @@ def test_a_single_box_is_never_parted() -> None:
         assert_is(found[0], box)
 
 
-def test_a_box_behind_another_is_open_where_it_is_hidden() -> None:
+def test_a_box_behind_another_is_uncertain_where_it_is_hidden() -> None:
     front = (-0.1, -0.1, 0.1, 0.2, 0.1, 0.2, 0.0)
     back = (0.0, 0.1, 0.125, 0.3, 0.1, 0.25, 0.0)  # reaches out 5 cm beside the front one, at right
     found = see(front, back)
@@ -121,7 +122,7 @@ def test_unorganised_points_hide_each_other_too() -> None:
     points = depth_to_points(add_noise(depth, "kinect", np.random.default_rng(0)), KINECT)
     cloud = points[np.isfinite(points[..., 2])]
     np.random.default_rng(0).shuffle(cloud)
-    found = pipeline().estimate_all(cloud)
+    found = pipeline().estimate_all(DepthView(cloud))
     assert len(found) == 2
     for one, box in zip(found, (front, back), strict=True):
         assert_is(one, box)
@@ -131,7 +132,7 @@ def test_unorganised_points_hide_each_other_too() -> None:
 PILLAR = (0.0, -0.12, 0.16, 0.06, 0.06, 0.32, 0.0)  # hides a strip from the table to the top
 
 
-def test_an_object_that_another_one_parts_in_the_image_is_one() -> None:
+def test_an_object_that_another_one_divides_in_the_image_is_one() -> None:
     behind = (0.01, 0.05, 0.06, 0.34, 0.12, 0.12, 0.1)
     found = see(PILLAR, behind)
     assert len(found) == 2
@@ -155,7 +156,7 @@ def test_two_objects_behind_another_one_stay_two(other: Box) -> None:
 @pytest.mark.parametrize(
     "box", [(0.5, 0.0, 0.075, 0.3, 0.1, 0.15, 0.3), (0.0, -0.45, 0.05, 0.2, 0.3, 0.1, 0.3)]
 )
-def test_a_box_cut_by_the_border_says_so_and_is_open_there(box: Box) -> None:
+def test_a_box_truncated_by_the_border_says_so_and_is_uncertain_there(box: Box) -> None:
     (found,) = see(box)
     assert found.truncated
     spread = 0.2 * np.sqrt(np.diag(found.estimate.covariance))[3:5]
@@ -204,23 +205,23 @@ def test_frames_without_an_object_have_a_reason(real_frame: RealFrame) -> None:
         (turned, "the camera is upside down"),
         (nowhere * np.nan, "no support plane"),
     ):
-        (none,) = pipeline().estimate_all(points.astype(np.float32))
+        (none,) = pipeline().estimate_all(DepthView(points.astype(np.float32)))
         assert none.estimate.status is Status.NO_OBJECT
         assert reason in none.estimate.reason
         assert np.isnan(none.estimate.theta).all() and not none.mask.any()
 
 
 def test_the_nearest_object_is_the_first_of_all(real_frame: RealFrame) -> None:
-    alone = pipeline().estimate(real_frame.points)
-    first = pipeline().estimate_all(real_frame.points)[0].estimate
+    alone = pipeline().estimate(DepthView(real_frame.points))
+    first = pipeline().estimate_all(DepthView(real_frame.points))[0].estimate
     assert alone.points_used == first.points_used
     np.testing.assert_allclose(alone.theta, first.theta, atol=1e-4)
 
 
 def test_an_object_with_a_large_hole_keeps_its_size(real_frame: RealFrame) -> None:
-    whole = pipeline().estimate_all(real_frame.points)[0]
+    whole = pipeline().estimate_all(DepthView(real_frame.points))[0]
     hole = cv2.erode(whole.mask.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0
-    found = pipeline().estimate_all(np.where(hole[..., None], np.nan, real_frame.points))
+    found = pipeline().estimate_all(DepthView(np.where(hole[..., None], np.nan, real_frame.points)))
     estimate = min(
         (one.estimate for one in found),
         key=lambda e: float(np.abs(e.theta[:2] - whole.estimate.theta[:2]).max()),

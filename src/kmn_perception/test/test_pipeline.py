@@ -9,6 +9,7 @@ import numba
 
 import kmn_perception
 from kmn_perception.estimator import Status
+from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import RealFrame, tabletop_pipeline
 
@@ -35,7 +36,7 @@ def test_a_real_carton_is_estimated_and_nothing_is_compiled_for_it(real_frame: R
     pipeline = tabletop_pipeline()
     pipeline.warm_up()
     before = compiled_signatures()
-    found = pipeline.estimate_all(real_frame.points)
+    found = pipeline.estimate_all(DepthView(real_frame.points))
     assert compiled_signatures() == before
     for one in found:
         assert one.estimate.status is Status.OK, one.estimate.reason

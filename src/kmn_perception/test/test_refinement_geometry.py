@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
 from kmn_perception.refinement.geometry import shape_of, unit_cubes_jacobian
-from kmn_perception.refinement.view import model_view, projection, raycast_any
+from kmn_perception.refinement.view import model_view, raycast_any
 
 Vector = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def test_unit_cubes_move_as_finite_differences_say(
 @settings(max_examples=20)
 @given(shares)
 def test_planes_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
-    values, shape, matrix = within(model, share), shape_of(model), projection(model.camera)
+    values, shape, matrix = within(model, share), shape_of(model), model.camera.projection
     view = model_view(shape, values, matrix)
     offsets = np.linalg.norm(view.solids[:, 4:22].reshape(-1, 6, 3)[..., :2], axis=-1)
     seen_well = offsets < 0.1  # a face that is seen exactly from the side has no slope
@@ -104,7 +104,7 @@ def test_planes_move_as_finite_differences_say(model: KinematicModel, share: lis
 @settings(max_examples=20)
 @given(shares)
 def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
-    values, shape, matrix = within(model, share), shape_of(model), projection(model.camera)
+    values, shape, matrix = within(model, share), shape_of(model), model.camera.projection
     view = model_view(shape, values, matrix)
     shown = view.faces >= 0
 
@@ -128,7 +128,7 @@ def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list
 def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[float]) -> None:
     values, camera = within(model, share), model.camera.resized(64, 48)
     depth = render(model.unit_cubes(*model.split(values)), camera)
-    view = model_view(shape_of(model), values, projection(camera))
+    view = model_view(shape_of(model), values, camera.projection)
     met = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
     np.testing.assert_array_equal(met > 0.0, np.isfinite(depth))
     np.testing.assert_allclose(1.0 / met[met > 0.0], depth[met > 0.0], rtol=1e-5)
@@ -137,14 +137,14 @@ def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[flo
 def test_a_box_seen_from_above_has_the_silhouette_of_its_outline() -> None:
     """The camera of the boxes sees the front and the top of a box that stands before it."""
     box = KinematicModel.load("box_b")
-    view = model_view(shape_of(box), np.zeros(3), projection(box.camera))
+    view = model_view(shape_of(box), np.zeros(3), box.camera.projection)
     assert (view.faces[0] >= 0).sum() == 6
     corners = (
         box.unit_cubes([0, 0, 0], [])[0]
         @ np.array([[sx, sy, sz, 2.0] for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]).T
         / 2.0
     )
-    points = projection(box.camera) @ corners
+    points = box.camera.projection @ corners
     pixels = (points[:2] / points[2]).T
     inside = np.concatenate([pixels.mean(axis=0), [1.0]])
     for edge in np.flatnonzero(view.faces[0] >= 0):

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.transformation import transform_points
-from kmn_perception.scene.segmentation import SegmentationSettings, remove_background
+from kmn_perception.scene import segmentation
+from kmn_perception.scene.segmentation import SegmentationSettings
+from kmn_perception.scene.settings import SceneSettings
 from kmn_perception.scene.support_plane import SupportPlaneSettings, find_support_plane, pose_above
 
 from .conftest import cuboid
@@ -33,6 +35,7 @@ SETTINGS = SegmentationSettings(
     cluster_min_points=50,
     cluster_concave_angle=0.5,
 )
+CONCAVE_EDGES = SceneSettings.load().concave_edges
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)
 KINECT_V1 = np.array([[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]])
@@ -46,10 +49,20 @@ def view(*cuboids: NDArray[np.float64]) -> NDArray[np.float32]:
     return depth_to_points(render(np.array(cuboids), CAMERA), CAMERA)
 
 
+def nearest(
+    points: NDArray[np.float32],
+    pose: NDArray[np.float64],
+    viewpoint: NDArray[np.float64],
+    settings: SegmentationSettings = SETTINGS,
+) -> NDArray[np.float32]:
+    """Return the nearest object's points in the world frame."""
+    return segmentation.segment(points, pose, viewpoint, settings, CONCAVE_EDGES).of_object(0)
+
+
 def segment(
     points: NDArray[np.float32], settings: SegmentationSettings = SETTINGS
 ) -> NDArray[np.float32]:
-    return remove_background(points, CAMERA.pose, CAMERA.pose[:3, 3], settings)
+    return nearest(points, CAMERA.pose, CAMERA.pose[:3, 3], settings)
 
 
 def distances(points: NDArray[np.float32], cube: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,7 +123,7 @@ def test_image_clusters_are_the_connected_components(mask: NDArray[np.bool_]) ->
     grid = np.stack([columns, rows, np.zeros(mask.shape)], axis=-1).astype(np.float32)
     points = np.where(mask[..., None], grid, np.float32(np.nan))
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
-    found = remove_background(
+    found = nearest(
         points,
         np.eye(4),
         np.array([-100.0, -1.0, 0.0]),
@@ -130,7 +143,7 @@ def test_cloud_clusters_are_the_connected_voxels(voxels: NDArray[np.bool_]) -> N
     graph.add_edges_from(
         (a, b) for a in graph for b in graph if max(np.abs(np.subtract(a, b))) == 1
     )
-    found = remove_background(
+    found = nearest(
         occupied.astype(np.float32) + np.float32(0.5),
         np.eye(4),
         np.array([-100.0, -1.0, 0.0]),
@@ -145,7 +158,7 @@ def test_one_carton_is_left_of_a_real_frame(real_frame: Any) -> None:
     plane = find_support_plane(real_frame.points, SupportPlaneSettings(0.01, np.radians(75.0), 0.2))
     assert plane is not None
     pose = pose_above(plane, CAMERA.pose)
-    found = remove_background(real_frame.points, pose, pose[:3, 3], SETTINGS)
+    found = nearest(real_frame.points, pose, pose[:3, 3])
     x, y, z = KINECT_V1 @ pose[:3, :3].T @ (found - pose[:3, 3]).T
     labels = real_frame.labels[np.rint(y / z).astype(int), np.rint(x / z).astype(int)]
     counts = np.bincount(labels)

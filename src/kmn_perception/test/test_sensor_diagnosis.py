@@ -14,15 +14,17 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.scene.sensor_diagnosis import Description, DiagnosisSettings, diagnose
+from kmn_perception.scene.settings import SceneSettings
 
 KINECT = Camera.load("kinect_v1")
 SETTINGS = DiagnosisSettings.load()
+INTRINSICS = SceneSettings.load().intrinsics
 FRAMES = load_frames()
 DESCRIBED = Description(KINECT, "camera_depth_optical_frame", "camera_depth_optical_frame")
 
 
 def _keys(points: NDArray[np.float32], described: Description = DESCRIBED) -> list[str]:
-    found = diagnose(points.astype(np.float32), described, SETTINGS)
+    found = diagnose(points.astype(np.float32), described, SETTINGS, INTRINSICS)
     assert all(len(diagnosis.text) > 40 for diagnosis in found)
     return [diagnosis.key for diagnosis in found]
 
@@ -69,7 +71,7 @@ def test_intrinsics_of_another_resolution_are_recognised(depth: NDArray[np.float
     large = replace(KINECT, width=320, height=240)  # as for 640 x 480
     assert _keys(depth_to_points(half, large), Description(large)) == ["other_resolution"]
     small = replace(KINECT.resized(320, 240), width=640, height=480)
-    (found,) = diagnose(depth_to_points(depth, small), Description(small), SETTINGS)
+    (found,) = diagnose(depth_to_points(depth, small), Description(small), SETTINGS, INTRINSICS)
     assert found.key == "other_resolution"
     assert "in that of one of 320 x 240" in found.text
 

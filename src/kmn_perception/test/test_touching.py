@@ -12,7 +12,8 @@ from kmn_perception.experiments.labelled_frame import read_frames
 from kmn_perception.experiments.reference import measure
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.experiments.upright_box import UprightBox, box_of_cube, intersection_over_union
-from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.model.rendering import render
+from kmn_perception.scene.depth_view import DepthView
 
 SETTINGS = ExperimentSettings.load()
 LABEL = 20  # the carton that is half hidden
@@ -41,11 +42,11 @@ def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, sid
     depth = np.fmin(frame.depth, before).astype(np.float32)
 
     seen = (frame.labels == LABEL) & (depth == frame.depth)
-    found = pipeline.estimate_all(depth_to_points(depth, SETTINGS.camera))
+    found = pipeline.estimate_all(DepthView.of_depth(depth, SETTINGS.camera))
     (half,) = (one for one in found if (one.mask & seen).sum() > 0.8 * one.mask.sum())
     assert half.estimate.status is Status.OK, half.estimate.reason
     estimate = box_of_cube(model.unit_cubes(half.estimate.theta, half.estimate.gamma)[0])
-    pose = pipeline.camera_pose(depth_to_points(depth, SETTINGS.camera))
+    pose = pipeline.camera_pose(DepthView.of_depth(depth, SETTINGS.camera))
     change = pose @ np.linalg.inv(references.camera.pose)
     turn = np.arctan2(change[1, 0], change[0, 0])
     truth = UprightBox(carton.centre, carton.size, carton.yaw + turn).as_near(estimate)
@@ -70,7 +71,7 @@ def test_two_that_seem_one_are_not_stated_as_one_box(name: str) -> None:
     centre = np.append(level.centre[:2] + axes @ offset, size[2] / 2.0)
     behind = render(UprightBox(centre, size, level.yaw).unit_cube[None], references.camera)
     depth = np.fmin(frame.depth, behind).astype(np.float32)
-    for found in pipeline.estimate_all(depth_to_points(depth, SETTINGS.camera)):
+    for found in pipeline.estimate_all(DepthView.of_depth(depth, SETTINGS.camera)):
         shares = [(found.mask & part).mean() for part in (behind == depth, behind != depth)]
         if min(shares) > 0.03 * max(shares):
             assert found.estimate.status is Status.NOT_CONVERGED

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
@@ -17,9 +16,10 @@ from kmn_perception.refinement import refine
 from kmn_perception.ros.messages import (
     markers_from_estimates,
     parameters_from_estimate,
-    points_from_cloud,
+    view_from_cloud,
 )
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.scene.depth_view import DepthView
 
 STEPS = 5  # predictions, as in the paper, or as many as the network makes
 Stage = Callable[[], object]
@@ -40,16 +40,16 @@ def chain(
     # Without a tolerance all steps are made, as for an object that converges late.
     estimator.settings = dataclasses.replace(settings.estimator, iterations=STEPS, tolerance=0.0)
 
-    def message_to_array() -> NDArray[np.float32]:
-        return points_from_cloud(cloud, settings.max_range)
+    def message_to_view() -> DepthView:
+        return view_from_cloud(cloud, settings.max_range, settings.world_frame)
 
     def callback() -> None:
-        estimate = pipeline.estimate(message_to_array())
+        estimate = pipeline.estimate(message_to_view())
         parameters_from_estimate(model, estimate, cloud.header)
         markers_from_estimates(model, [estimate], cloud.header)
 
-    points = message_to_array()
-    views = pipeline.observe(points, most=1)
+    view = message_to_view()
+    views = pipeline.observe(view, 1)
     if not views:
         raise ValueError(f"the node's parameters leave nothing of a '{model.name}'")
     observation = views[0].observation
@@ -57,8 +57,8 @@ def chain(
     images = network.render_anew(0, seen, first)
     predicted, _ = predict(network, seen, STEPS)
     return {
-        "message_to_array": message_to_array,
-        "background_removal": lambda: pipeline.observe(points, most=1),
+        "message_to_view": message_to_view,
+        "background_removal": lambda: pipeline.observe(view, 1),
         "splat": lambda: network.render_anew(0, seen, first),
         "network": lambda: network.predict(0, images),
         "predictions": lambda: predict(network, seen, STEPS),

@@ -21,13 +21,15 @@ from kmn_perception.experiments.scores import Detection, Score, score
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.experiments.upright_box import UprightBox, box_of_cube
 from kmn_perception.model.observation import Observation
-from kmn_perception.model.rendering import depth_to_cloud, depth_to_points, render
+from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.network import weights
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
-from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError, ObjectEstimate
+from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.scene.camera_pose import NoCameraPoseError
+from kmn_perception.scene.depth_view import DepthView
 
 REPETITIONS = 3  # of a frame, for its time
 PARAMETER_FILES = ("morph_node", "morph_node_tabletop")  # the later overrides the earlier
@@ -100,10 +102,10 @@ def _run(
 ) -> FrameResult:
     model = pipeline.estimator.model
     references = measure(frame, settings, model.camera.pose)
-    points = depth_to_points(frame.depth, settings.camera)
-    objects, seconds = _estimate(points, pipeline)
+    view = DepthView.of_depth(frame.depth, settings.camera)
+    objects, seconds = _estimate(view, pipeline)
     try:
-        pose = pipeline.camera_pose(points)
+        pose = pipeline.camera_pose(view)
     except NoCameraPoseError:
         pose = references.camera.pose
     found = [i for i, o in enumerate(objects) if o.estimate.status is Status.OK]
@@ -140,14 +142,12 @@ def _run(
     )
 
 
-def _estimate(
-    points: NDArray[np.float32], pipeline: MorphPipeline
-) -> tuple[list[ObjectEstimate], float]:
+def _estimate(view: DepthView, pipeline: MorphPipeline) -> tuple[list[ObjectEstimate], float]:
     """Return all objects, and the seconds that it took of one core, whatever else runs beside."""
     seconds = []
     for _ in range(REPETITIONS):
         start = time.process_time()
-        objects = pipeline.estimate_all(points)
+        objects = pipeline.estimate_all(view)
         seconds.append(time.process_time() - start)
     return objects, min(seconds)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.point_rendering import inverse_depth_of_points
 
 
 class FreeSpace(NamedTuple):
@@ -28,7 +30,7 @@ class FreeSpace(NamedTuple):
 
 
 def all_free(height: int, width: int) -> FreeSpace:
-    """Return what a sensor saw that saw nothing else."""
+    """Return the free space of a sensor that saw nothing else."""
     free_depth = np.full((height, width), np.inf, dtype=np.float32)
     return FreeSpace(free_depth, np.zeros((height, width), dtype=np.bool_))
 
@@ -48,9 +50,21 @@ class Observation:
         Height (metres, world z) up to which points were lost with the support plane.
     free_space
         What was seen elsewhere; ``None``: all of it is empty.
+    depth
+        (height, width) the same points as the sensor measured them, metres, NaN where it does not
+        show the object; ``None``: they are projected into its pixels.
     """
 
     points: NDArray[np.float32]
     camera: Camera
     floor: float = -np.inf
     free_space: FreeSpace | None = None
+    depth: NDArray[np.float32] | None = None
+
+    @cached_property
+    def inverse_depth(self) -> NDArray[np.float32]:
+        """(height, width) of the object in the sensor's pixels, 1 / m; 0 where it is not seen."""
+        if self.depth is None:
+            return inverse_depth_of_points(self.points, self.camera)
+        visible = self.depth > self.camera.near
+        return np.divide(1.0, self.depth, out=np.zeros_like(self.depth), where=visible)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 
+HALF = 0.5
 FARTHEST = 1.0 / 256.0  # what is farther than ``far`` still differs from the background
 
 
@@ -71,7 +72,7 @@ def _splat(
     """Keep the nearest depth of each pixel; return the rows and columns that were hit."""
     height, width = buffer.shape
     v0, v1, u0, u1 = height, -1, width, -1
-    half = np.float32(0.5)
+    half = np.float32(HALF)
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
@@ -117,3 +118,43 @@ def _normalise(
                 value = (far - buffer[row, column]) / (far - near)
                 depth[row // block, column // block] += min(1.0, max(FARTHEST, value))
     return depth / np.float32(block * block)
+
+
+def inverse_depth_of_points(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+    """Return the inverse depth (height, width) of the nearest point in each pixel, 1 / m.
+
+    Parameters
+    ----------
+    points
+        (N, 3) world frame, metres.
+
+    Returns
+    -------
+    inverse_depth
+        0 where there is no point.
+    """
+    inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+    _project_nearest(inverse_depth, points, camera.projection, camera.near)
+    return inverse_depth
+
+
+@njit(cache=True)
+def _project_nearest(
+    inverse_depth: NDArray[np.float32],
+    points: NDArray[np.float32],
+    matrix: NDArray[np.float64],
+    near: float,
+) -> None:
+    """Keep the nearest point of each pixel."""
+    height, width = inverse_depth.shape
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
+        if not depth > near:
+            continue
+        scale = 1.0 / depth
+        u = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * scale + HALF
+        v = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * scale + HALF
+        if 0.0 <= u < width and 0.0 <= v < height:
+            row, column = int(v), int(u)
+            inverse_depth[row, column] = max(inverse_depth[row, column], scale)

@@ -9,9 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.model.observation import Observation, all_free
-from kmn_perception.refinement.view import projection
 
-HALF = 0.5
 THICKNESS = 0.004  # metres; other objects are at least as thick
 INTERPOLATED = 0.01  # metres by which interpolated depths may be wrong
 MIN_RANGE = 1e-6  # metres
@@ -52,15 +50,15 @@ class InverseDepthImage(NamedTuple):
 
 
 def inverse_depth_image(observation: Observation) -> InverseDepthImage:
-    """Put the points back into the pixels from which they came."""
+    """Return what the sensor saw of the object, and of the space around it."""
     camera = observation.camera
-    matrix = projection(camera)
+    matrix = camera.projection
     around = observation.free_space
     if around is None:
         around = all_free(camera.height, camera.width)
     with np.errstate(divide="ignore"):
         inverse_depth = np.float32(-1.0) / around.free_depth
-    pixels = _splat(inverse_depth, observation.points, matrix, camera.near)
+    pixels = _overlay(inverse_depth, observation.inverse_depth)
     to_world = np.linalg.inv(matrix[:, :3])
     upwards = np.append(to_world[2], camera.pose[2, 3])
     return InverseDepthImage(
@@ -92,29 +90,16 @@ def may_hide(seen: float, interpolated: bool, inverse_depth: float) -> bool:
 
 
 @njit(cache=True)
-def _splat(
-    inverse_depth: NDArray[np.float32],
-    points: NDArray[np.float32],
-    matrix: NDArray[np.float64],
-    near: float,
-) -> NDArray[np.float32]:
-    """Keep the nearest point of each pixel; return the pixels hit, in the points' order."""
-    height, width = inverse_depth.shape
-    pixels = np.empty((points.shape[0], 3), dtype=np.float32)
+def _overlay(inverse_depth: NDArray[np.float32], seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Put what is seen of the object over the rest; return its pixels (N, 3)."""
+    height, width = seen.shape
+    pixels = np.empty((height * width, 3), dtype=np.float32)
     count = 0
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-        if not depth > near:
-            continue
-        scale = 1.0 / depth
-        u = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * scale + HALF
-        v = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * scale + HALF
-        if not (0.0 <= u < width and 0.0 <= v < height):
-            continue
-        column, row = int(u), int(v)
-        if inverse_depth[row, column] < scale:
-            inverse_depth[row, column] = scale
-            pixels[count, 0], pixels[count, 1], pixels[count, 2] = column, row, scale
-            count += 1
-    return pixels[:count]
+    for row in range(height):
+        for column in range(width):
+            scale = seen[row, column]
+            if scale > 0.0:
+                inverse_depth[row, column] = scale
+                pixels[count, 0], pixels[count, 1], pixels[count, 2] = column, row, scale
+                count += 1
+    return pixels[:count].copy()

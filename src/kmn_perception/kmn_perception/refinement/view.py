@@ -13,7 +13,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.model.camera import Camera
 from kmn_perception.refinement.geometry import Shape, cuboids
 
 MIN_DEPTH = 1e-3  # metres in front of the camera; edges are cut off there
@@ -33,12 +32,6 @@ class ModelView(NamedTuple):
     line_slopes: NDArray[np.float64]  # (B, 12, 3, P)
     ends: NDArray[np.float64]  # (B, 12, 4) u, v of both ends
     faces: NDArray[np.int64]  # (B, 12) the visible face at a silhouette edge, -1 at other edges
-
-
-def projection(camera: Camera) -> NDArray[np.float64]:
-    """Return the (3, 4) map from the world to homogeneous pixels z (u, v, 1)."""
-    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
-    return matrix @ camera.world_to_camera[:3]
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,7 +18,7 @@ class FrameStatistics:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._received = self._lost = self._dropped = self._clock_jumps = 0
+        self._received = self._lost = self._dropped = self._superseded = self._clock_jumps = 0
         self._refused: Counter[str] = Counter()
         self._statuses: Counter[str] = Counter()
         self._used = self._objects = 0
@@ -36,8 +36,13 @@ class FrameStatistics:
         with self._lock:
             self._lost += count
 
+    def supersede(self) -> None:
+        """Count a frame whose exposure, or a later one, the camera's other topic has shown."""
+        with self._lock:
+            self._superseded += 1
+
     def count_clock_jump(self) -> None:
-        """Count a stamp that lies before the one received last."""
+        """Count a stamp that lies before the one received last on the same topic."""
         with self._lock:
             self._clock_jumps += 1
 
@@ -86,6 +91,7 @@ class FrameStatistics:
                 "frames_used": str(self._used),
                 "objects_last": str(self._objects),
                 "frames_dropped": str(self._dropped),
+                "frames_superseded": str(self._superseded),
                 "frames_refused": str(self._refused.total()),
                 **{f"refused_{key}": str(count) for key, count in sorted(self._refused.items())},
                 **{f"status_{key}": str(count) for key, count in sorted(self._statuses.items())},

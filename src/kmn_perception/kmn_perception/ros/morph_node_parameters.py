@@ -12,7 +12,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.rotation import matrix_from_quaternion
-from kmn_perception.pipeline import CameraPose, PipelineSettings
+from kmn_perception.pipeline import PipelineSettings
 from kmn_perception.ros.parameters import (
     ParameterError,
     anything,
@@ -22,8 +22,9 @@ from kmn_perception.ros.parameters import (
     real,
     whole,
 )
-from kmn_perception.scene.object_settings import ObjectSettings
+from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.segmentation import SegmentationSettings
+from kmn_perception.scene.settings import SceneSettings
 from kmn_perception.scene.support_plane import SupportPlaneSettings
 
 RELIABILITIES = ("best_effort", "reliable")
@@ -50,6 +51,8 @@ class MorphNodeSettings:
         By which an object's centre may move between two frames, metres.
     max_range
         Coordinates beyond it are not measurements, metres.
+    rectify
+        Rectify depth images whose description has a distortion.
     estimator, pipeline
         Settings of the two.
     """
@@ -61,6 +64,7 @@ class MorphNodeSettings:
     objects: str
     object_distance: float
     max_range: float
+    rectify: bool
     estimator: EstimatorSettings
     pipeline: PipelineSettings
 
@@ -97,13 +101,14 @@ class MorphNodeSettings:
             objects=values["objects"],
             object_distance=values["object_distance"],
             max_range=values["max_range"],
+            rectify=values["rectify"],
             estimator=pick(EstimatorSettings, values),
             pipeline=PipelineSettings(
                 camera_pose=CameraPose(values["camera_pose"]),
                 given_pose=_pose(values["camera_position"], values["camera_quaternion"]),
                 plane=pick(SupportPlaneSettings, values, "plane_"),
                 background=pick(SegmentationSettings, values),
-                objects=ObjectSettings.load(),
+                scene=SceneSettings.load(),
             ),
         )
 
@@ -141,6 +146,9 @@ DESCRIPTORS: dict[str, ParameterDescriptor] = {
     ),
     "plane_min_fraction": real("Least part of the points that lies on it.", 0.01, 1.0),
     "max_range": real("Coordinates beyond it are not measurements [m].", 0.1, 1e6),
+    "rectify": anything(
+        "Rectify depth images whose camera_info has a distortion; false: they are rectified."
+    ),
     "crop": anything("Keep only what lies in the crop volume."),
     "crop_min": anything("Lower corner of the crop volume, world frame [m].", "3 numbers"),
     "crop_max": anything("Upper corner of the crop volume, world frame [m].", "3 numbers"),

@@ -21,6 +21,13 @@ class ThrottledWarnings:
     def __init__(self, node: Node) -> None:
         self._logger = node.get_logger()
         self._warned: dict[str, float] = {}
+        self._told: dict[str, str] = {}
+
+    def warn_once(self, key: str, text: str) -> None:
+        """Log a warning, unless the last one with this key said the same."""
+        if self._told.get(key) != text:
+            self._told[key] = text
+            self._logger.warning(text)
 
     def warn(self, key: str, text: str) -> None:
         """Log a warning, unless there was one with this key just before."""

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 
 from kmn_perception.ros.messages import camera_from_info
 from kmn_perception.ros.reports import make_status
+from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.sensor_diagnosis import (
     Description,
     Diagnosis,
     DiagnosisSettings,
     diagnose,
 )
+from kmn_perception.scene.settings import IntrinsicsSettings
 
 
 class SensorWatch:
@@ -28,33 +28,32 @@ class SensorWatch:
         Seconds between two diagnoses at least: one takes milliseconds, and mistakes stay.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(
+        self, period: float, settings: DiagnosisSettings, intrinsics: IntrinsicsSettings
+    ) -> None:
         self._period, self._next = period, 0.0
-        self._settings = DiagnosisSettings.load()
+        self._settings, self._intrinsics = settings, intrinsics
         self._newest: list[Diagnosis] = []
 
-    def look(
-        self, points: NDArray[np.float32], frame_id: str, info: CameraInfo | None
-    ) -> list[Diagnosis]:
+    def look(self, view: DepthView, info: CameraInfo | None) -> list[Diagnosis]:
         """Return what is likely to be wrong, or nothing if that was told just before.
 
         Parameters
         ----------
-        points
-            As for `diagnose`.
-        frame_id
-            Of what was measured.
+        view
+            What was measured, not in the world frame.
         info
-            The description that the points were made with, if there is one.
+            The newest description of the camera, if one came.
         """
         now = time.monotonic()
         if now < self._next:
             return []
         self._next = now + self._period
-        described = Description(frame=frame_id)
-        if info is not None:
-            described = Description(camera_from_info(info), frame_id, info.header.frame_id)
-        self._newest = diagnose(points, described, self._settings)
+        described = Description(frame=view.frame)
+        if info is not None and (view.camera is not None or info.header.frame_id == view.frame):
+            camera = view.camera or camera_from_info(info)
+            described = Description(camera, view.frame, info.header.frame_id)
+        self._newest = diagnose(view.points, described, self._settings, self._intrinsics)
         return self._newest
 
     def report(self, name: str) -> DiagnosticStatus:

@@ -9,8 +9,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-LEG = 8  # pixels to both sides of a pixel, whose mean points make the angle
-REACH = 2  # pixels around each of these, over which the points are averaged
 DIRECTIONS = np.array([(0, 1), (1, 0), (1, 1), (1, -1)])  # rows and columns, half of all
 
 
@@ -20,6 +18,8 @@ def find_concave_edges(
     labels: NDArray[np.int32],
     viewpoint: NDArray[np.float64],
     angle: float,
+    leg: int,
+    reach: int,
 ) -> NDArray[np.bool_]:
     """Tell at which pixels a connected surface folds inwards by more than an angle.
 
@@ -34,6 +34,8 @@ def find_concave_edges(
         (3,) where the camera stands.
     angle
         By which the surface deviates from flat, radians.
+    leg, reach
+        See `ConcaveEdgeSettings`.
 
     Returns
     -------
@@ -41,18 +43,18 @@ def find_concave_edges(
         (height * width,)
     """
     height, width, _ = points.shape
-    means = _mean_points(points, labels)
+    means = _mean_points(points, labels, reach)
     concave_edges = np.zeros(height * width, dtype=np.bool_)
     steepest = np.tan(0.5 * angle) ** 2
-    for row in range(LEG, height - LEG):
-        for column in range(LEG, width - LEG):
+    for row in range(leg, height - leg):
+        for column in range(leg, width - leg):
             i = row * width + column
             if labels[i] < 0:
                 continue
             for d in range(4):
-                leg = LEG * (DIRECTIONS[d, 0] * width + DIRECTIONS[d, 1])
-                if labels[i - leg] == labels[i] == labels[i + leg] and _folds_inwards(
-                    means[i - leg], means[i], means[i + leg], viewpoint, steepest
+                offset = leg * (DIRECTIONS[d, 0] * width + DIRECTIONS[d, 1])
+                if labels[i - offset] == labels[i] == labels[i + offset] and _folds_inwards(
+                    means[i - offset], means[i], means[i + offset], viewpoint, steepest
                 ):
                     concave_edges[i] = True
                     break
@@ -78,7 +80,9 @@ def _folds_inwards(
 
 
 @njit(cache=True)
-def _mean_points(points: NDArray[np.float32], labels: NDArray[np.int32]) -> NDArray[np.float32]:
+def _mean_points(
+    points: NDArray[np.float32], labels: NDArray[np.int32], reach: int
+) -> NDArray[np.float32]:
     """Return the mean point (height * width, 3) around each labelled pixel, of its component."""
     height, width, _ = points.shape
     flat = points.reshape(-1, 3)
@@ -89,8 +93,8 @@ def _mean_points(points: NDArray[np.float32], labels: NDArray[np.int32]) -> NDAr
             if labels[i] < 0:
                 continue
             x, y, z, count = 0.0, 0.0, 0.0, 0
-            for v in range(max(row - REACH, 0), min(row + REACH + 1, height)):
-                for u in range(max(column - REACH, 0), min(column + REACH + 1, width)):
+            for v in range(max(row - reach, 0), min(row + reach + 1, height)):
+                for u in range(max(column - reach, 0), min(column + reach + 1, width)):
                     j = v * width + u
                     if labels[j] == labels[i]:
                         x, y, z = x + flat[j, 0], y + flat[j, 1], z + flat[j, 2]

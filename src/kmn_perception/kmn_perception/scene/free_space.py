@@ -27,8 +27,8 @@ def free_space(
     Where nothing was measured, it is the larger one of those beside the gap in the same row: a
     sensor with a projector beside it does not measure in the shadow that something near throws on
     something far, so that the gap may hide the far thing, but not the near one. Of a gap within an
-    object nothing is known. A wide gap up to the image's border shows nothing in range, of a narrow
-    one nothing is known.
+    object nothing is known. A wide gap up to the image's border, along its row and its column,
+    shows nothing in range; of a narrow one nothing is known.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def free_space(
     floor
         World height in metres of what belongs to the support.
     border_run
-        Pixels at the image's sides that a sensor may not measure at all.
+        Pixels at the image's border that a sensor may not measure at all.
     """
     rows = to_camera[2].copy(), to_world[2].copy()
     free = _free_depth(points, labels, *rows, floor, border_run)
@@ -89,7 +89,26 @@ def _free_depth(
             free[row, column] = EMPTY if on_support else depth
             last, left, left_label = column, depth, label
         _fill(free[row], last + 1, width, left, UNKNOWN, False, border_run)
+    _forget_narrow_gaps(free, points, border_run)
     return free
+
+
+@njit(cache=True)
+def _forget_narrow_gaps(
+    free: NDArray[np.float32], points: NDArray[np.float32], border_run: int
+) -> None:
+    """Let nothing be known of narrow gaps at the upper and the lower border."""
+    height, width = free.shape
+    for column in range(width):
+        for first, step in ((0, 1), (height - 1, -1)):
+            length = 0
+            while length <= border_run and length < height:
+                if np.isfinite(points[first + step * length, column, 2]):
+                    break
+                length += 1
+            if length <= border_run and length < height:
+                for k in range(length):
+                    free[first + step * k, column] = UNKNOWN
 
 
 @njit(cache=True)
@@ -120,9 +139,12 @@ def _fill(
 @njit(cache=True)
 def is_truncated(mask: NDArray[np.bool_], free: NDArray[np.float32]) -> bool:
     """Tell whether an object's pixels reach the image's border, or the unknown pixels there."""
+    return _reaches_the_sides(mask, free) or _reaches_the_sides(mask.T, free.T)
+
+
+@njit(cache=True)
+def _reaches_the_sides(mask: NDArray[np.bool_], free: NDArray[np.float32]) -> bool:
     height, width = mask.shape
-    if mask[0].any() or mask[height - 1].any():
-        return True
     for row in range(height):
         first, last = 0, width - 1
         while first < last and free[row, first] == UNKNOWN:

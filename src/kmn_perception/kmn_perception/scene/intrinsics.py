@@ -6,16 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
-
-MIN_POINTS = 50
-STRIDE = 7  # every so many pixels are plenty to fit four numbers
-TOLERANCE = 0.5  # pixels; a cloud whose points lie further from their pixels is not of a pinhole
-COARSEST = 16  # times coarser than the canonical camera, for clouds without rows and columns
-DENSE = 0.9  # share of the pixels with a point whose neighbours have one, too
+from kmn_perception.scene.settings import IntrinsicsSettings
 
 
 def camera_of_points(
-    points: NDArray[np.float32], to_camera: NDArray[np.float64], pose: NDArray[np.float64]
+    points: NDArray[np.float32], to_camera: NDArray[np.float64], settings: IntrinsicsSettings
 ) -> Camera | None:
     """Return the camera whose pixels are the points, or None if there is no such camera.
 
@@ -25,15 +20,19 @@ def camera_of_points(
         (height, width, 3) metres, NaN for none.
     to_camera
         (4, 4) transformation of the points to the optical frame.
-    pose
-        (4, 4) optical frame in the world frame, for the camera that is returned.
+
+    Returns
+    -------
+    camera
+        With the identity as its pose.
     """
     height, width = points.shape[:2]
-    rows, columns = np.arange(0, height, STRIDE), np.arange(0, width, STRIDE)
-    drawn = points[::STRIDE, ::STRIDE] @ to_camera[:3, :3].T + to_camera[:3, 3]
+    stride = settings.stride
+    rows, columns = np.arange(0, height, stride), np.arange(0, width, stride)
+    drawn = points[::stride, ::stride] @ to_camera[:3, :3].T + to_camera[:3, 3]
     v, u = np.meshgrid(rows, columns, indexing="ij")
     measured = drawn[..., 2] > 0.0
-    if measured.sum() < MIN_POINTS:
+    if measured.sum() < settings.min_points:
         return None
     ray = drawn[measured][:, :2] / drawn[measured][:, 2:]
     pixel = np.stack((u[measured], v[measured]), axis=1).astype(np.float64)
@@ -43,7 +42,7 @@ def camera_of_points(
     centred, mean = ray - ray.mean(axis=0), pixel.mean(axis=0)
     focal = (centred * (pixel - mean)).mean(axis=0) / spread**2
     centre = mean - focal * ray.mean(axis=0)
-    if np.abs(focal * ray + centre - pixel).max() > TOLERANCE or focal.min() <= 0.0:
+    if np.abs(focal * ray + centre - pixel).max() > settings.tolerance or focal.min() <= 0.0:
         return None
     return Camera(
         width=width,
@@ -52,11 +51,13 @@ def camera_of_points(
         fy=float(focal[1]),
         cx=float(centre[0]),
         cy=float(centre[1]),
-        pose=pose,
+        pose=np.eye(4),
     )
 
 
-def camera_as_dense(points: NDArray[np.float32], camera: Camera) -> Camera:
+def camera_as_dense(
+    points: NDArray[np.float32], camera: Camera, settings: IntrinsicsSettings
+) -> Camera:
     """Return a camera with this view, of as many pixels as the points can fill without holes.
 
     Parameters
@@ -64,15 +65,15 @@ def camera_as_dense(points: NDArray[np.float32], camera: Camera) -> Camera:
     points
         (N, 3) world frame, metres.
     """
-    x, y, z = (points @ camera.world_to_camera[:3, :3].T + camera.world_to_camera[:3, 3]).T
-    for coarser in range(1, COARSEST):
+    for coarser in range(1, settings.max_coarsening):
         candidate = camera.resized(camera.width // coarser, camera.height // coarser)
-        u = np.rint(candidate.fx * x / z + candidate.cx).astype(int)
-        v = np.rint(candidate.fy * y / z + candidate.cy).astype(int)
-        inside = (z > 0.0) & (u >= 0) & (v >= 0) & (u < candidate.width) & (v < candidate.height)
+        pixels = candidate.project(points)
+        inside = pixels[:, 2] > 0.0
+        u, v = np.rint(pixels[inside, :2]).astype(int).T
+        within = (u >= 0) & (v >= 0) & (u < candidate.width) & (v < candidate.height)
         hit = np.zeros((candidate.height, candidate.width), dtype=bool)
-        hit[v[inside], u[inside]] = True
+        hit[v[within], u[within]] = True
         neighbours = np.concatenate(((hit[:, 1:])[hit[:, :-1]], (hit[1:])[hit[:-1]]))
-        if len(neighbours) and neighbours.mean() >= DENSE:
+        if len(neighbours) and neighbours.mean() >= settings.dense:
             return candidate
     return camera

@@ -1,4 +1,4 @@
-"""Objects that something in front of them parts in the image."""
+"""Occlusion: objects that something in front of them divides in the image."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-MIN_ROWS = 10  # in which the two parts lie on both sides of the same thing
-
 
 def find_occluded_pairs(
-    masks: Sequence[NDArray[np.bool_]], free_depth: NDArray[np.float32]
+    masks: Sequence[NDArray[np.bool_]], free_depth: NDArray[np.float32], min_rows: int
 ) -> list[tuple[int, int]]:
     """Return the pairs of objects between which there is nothing but a nearer object.
 
@@ -22,12 +20,14 @@ def find_occluded_pairs(
         (height, width) of each object, the nearest first.
     free_depth
         (height, width) up to where a pixel is empty, infinite where it shows the support.
+    min_rows
+        In which the two lie on both sides of the same nearer thing.
     """
     labels = np.full(free_depth.shape, -1, dtype=np.int32)
     for label, mask in enumerate(masks):
         labels[mask] = label
     rows = _count_rows(labels, free_depth, len(masks))
-    return [(int(a), int(b)) for a, b in np.argwhere(np.triu(rows + rows.T, 1) >= MIN_ROWS)]
+    return [(int(a), int(b)) for a, b in np.argwhere(np.triu(rows + rows.T, 1) >= min_rows)]
 
 
 @njit(cache=True)

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.scene.concave_edges import find_concave_edges
+from kmn_perception.scene.settings import ConcaveEdgeSettings
 from kmn_perception.scene.union_find import join, number
 
 INFINITE = np.full(3, np.inf)
@@ -33,15 +34,16 @@ class SegmentationSettings:
     plane_margin
         Height up to which points belong to the support plane, metres.
     cluster
-        Keep only the nearest large cluster.
+        Divide the points into clusters, of which the large ones are objects; else all points are
+        those of one object.
     cluster_step
         Neighbouring points further apart than this belong to different clusters, metres. For
         unorganised points it is the size of the voxels whose neighbourhood joins them.
     cluster_min_points
         Smaller clusters are not objects.
     cluster_concave_angle
-        Surfaces that meet at a concave angle, and deviate by more than this from a flat one, belong
-        to different clusters, radians; 0 for none. Only organised points tell.
+        Where a surface folds inwards and deviates by more than this from a flat one, it belongs to
+        two clusters, radians; 0: to one. Only organised points tell.
     """
 
     crop: bool
@@ -82,8 +84,9 @@ def segment(
     pose: NDArray[np.float64],
     viewpoint: NDArray[np.float64],
     settings: SegmentationSettings,
+    concave_edges: ConcaveEdgeSettings,
 ) -> Segments:
-    """Tell the objects' points from the others.
+    """Separate the objects' points from the others.
 
     Parameters
     ----------
@@ -93,6 +96,8 @@ def segment(
         (4, 4) transformation of the points to the world frame.
     viewpoint
         (3,) where the camera stands in the world frame.
+    concave_edges
+        How these are found in organised points.
     """
     corners = (settings.crop_min, settings.crop_max) if settings.crop else (-INFINITE, INFINITE)
     low, high = np.array(corners)
@@ -103,23 +108,10 @@ def segment(
         return Segments(world, kept.astype(np.int32) - 1, int(kept.any()))
     eye = np.ascontiguousarray(viewpoint)  # compiled once, whatever it is a part of
     if points.ndim == 3:
-        labels = _part_image(world.reshape(points.shape), kept, eye, settings)
+        labels = _part_image(world.reshape(points.shape), kept, eye, settings, concave_edges)
     else:
         labels = _label_cloud(world, kept, settings.cluster_step)
     return Segments(world, *_sort(world, labels, eye, settings.cluster_min_points))
-
-
-def remove_background(
-    points: NDArray[np.float32],
-    pose: NDArray[np.float64],
-    viewpoint: NDArray[np.float64],
-    settings: SegmentationSettings,
-) -> NDArray[np.float32]:
-    """Return the nearest object's points (M, 3) in the world frame; M = 0 if there is no object.
-
-    The parameters are those of `segment`.
-    """
-    return segment(points, pose, viewpoint, settings).of_object(0)
 
 
 def _part_image(
@@ -127,12 +119,14 @@ def _part_image(
     kept: NDArray[np.bool_],
     viewpoint: NDArray[np.float64],
     settings: SegmentationSettings,
+    scale: ConcaveEdgeSettings,
 ) -> NDArray[np.int32]:
-    """Label organised points by what hangs together without a step and without a crease."""
+    """Label organised points by what is connected without a step and without a concave edge."""
     labels = _label_image(points, kept, settings.cluster_step)
     if settings.cluster_concave_angle == 0.0:
         return labels
-    concave_edges = find_concave_edges(points, labels, viewpoint, settings.cluster_concave_angle)
+    angle = settings.cluster_concave_angle
+    concave_edges = find_concave_edges(points, labels, viewpoint, angle, scale.leg, scale.reach)
     if not concave_edges.any():
         return labels
     parts = _label_image(points, kept & ~concave_edges, settings.cluster_step)

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.settings import (
+    Count,
+    Fraction,
+    NonNegative,
+    Positive,
+    load_settings,
+)
 from kmn_perception.model.camera import Camera
 from kmn_perception.scene.intrinsics import camera_of_points
+from kmn_perception.scene.settings import IntrinsicsSettings
 
-MIN_POINTS = 50
 MM_PER_M = 1000.0
 COLOUR_FRAMES = ("color", "colour", "rgb")  # parts of the names of colour cameras' frames
 
@@ -64,37 +70,28 @@ class Description(NamedTuple):
 class DiagnosisSettings:
     """Limits of what is plausible; see the comments in ``config/sensor_diagnosis.yaml``."""
 
-    nearest: float
-    farthest: float
-    off_centre: float
-    focal_length: float
-    single_holes: float
-    hole_step: float
-    baseline: float
-    ray_error: float
-    hole_reach: int
-    pixels: int
+    nearest: Positive
+    farthest: Positive
+    off_centre: Fraction
+    focal_length: Fraction
+    single_holes: Fraction
+    hole_step: Fraction
+    baseline: NonNegative
+    ray_error: NonNegative
+    hole_reach: Count
+    pixels: Count
 
     @classmethod
     def load(cls) -> DiagnosisSettings:
         """Read the settings; raise ``ConfigurationError`` with the key that is wrong."""
-        section = Section.load(resources.share_directory() / "config/sensor_diagnosis.yaml")
-        counts = ("hole_reach", "pixels")
-        names = [field.name for field in fields(cls)]
-        section.allow(names)
-        values: dict[str, Any] = {
-            name: section.whole_number(name, 1, 10**6)
-            if name in counts
-            else section.number(name, 0.0, 1e6)
-            for name in names
-        }
-        return cls(**values)
+        return load_settings(cls, resources.find("config", "sensor_diagnosis"))
 
 
 def diagnose(
     points: NDArray[np.float32],
     described: Description,
     settings: DiagnosisSettings,
+    intrinsics: IntrinsicsSettings,
 ) -> list[Diagnosis]:
     """Return what is likely to be wrong with the description of a sensor.
 
@@ -104,24 +101,27 @@ def diagnose(
         (height, width, 3) organised or (N, 3) unorganised, in what is said to be an optical frame
         and metres; NaN for none. Fewer mistakes can be recognised from unorganised points.
     """
-    return list(_diagnose(points, described, settings))
+    return list(_diagnose(points, described, settings, intrinsics))
 
 
 def _diagnose(
-    points: NDArray[np.float32], described: Description, settings: DiagnosisSettings
+    points: NDArray[np.float32],
+    described: Description,
+    settings: DiagnosisSettings,
+    intrinsics: IntrinsicsSettings,
 ) -> Iterator[Diagnosis]:
     flat = points.reshape(-1, 3)
     drawn = flat[:: max(1, len(flat) // settings.pixels)]
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
-    if len(drawn) < MIN_POINTS:
+    if len(drawn) < intrinsics.min_points:
         return
     yield from _unit(drawn, settings)
-    other_axes = list(_axes(points, drawn))
+    other_axes = list(_axes(points, drawn, intrinsics))
     yield from other_axes
     if points.ndim == 3 and not other_axes:
-        found = camera_of_points(points, np.eye(4), np.eye(4))
+        found = camera_of_points(points, np.eye(4), intrinsics)
         if found is None:
-            yield from _other_origin(points, settings)
+            yield from _other_origin(points, settings, intrinsics.min_points)
         else:
             yield from _intrinsics(found, described, settings)
         yield from _resampled(points[..., 2], described, settings)
@@ -144,7 +144,9 @@ def _unit(points: NDArray[np.float32], settings: DiagnosisSettings) -> Iterator[
         )
 
 
-def _axes(points: NDArray[np.float32], drawn: NDArray[np.float32]) -> Iterator[Diagnosis]:
+def _axes(
+    points: NDArray[np.float32], drawn: NDArray[np.float32], intrinsics: IntrinsicsSettings
+) -> Iterator[Diagnosis]:
     """Tell whether the points are in other axes than those of an optical frame.
 
     Rows and columns of an organised cloud show its axes. Of other clouds it is only known that all
@@ -156,7 +158,7 @@ def _axes(points: NDArray[np.float32], drawn: NDArray[np.float32]) -> Iterator[D
         to_optical = np.eye(4)
         to_optical[:3, :3] = rows
         if points.ndim == 3:
-            fits = camera_of_points(points, to_optical, np.eye(4)) is not None
+            fits = camera_of_points(points, to_optical, intrinsics) is not None
         else:
             fits = bool((drawn @ to_optical[2, :3] > 0.0).all())
         if fits:
@@ -231,7 +233,9 @@ def _single_holes(depth: NDArray[np.float32], settings: DiagnosisSettings) -> fl
     return float(single.sum() / measured.sum())
 
 
-def _other_origin(points: NDArray[np.float32], settings: DiagnosisSettings) -> Iterator[Diagnosis]:
+def _other_origin(
+    points: NDArray[np.float32], settings: DiagnosisSettings, min_points: int
+) -> Iterator[Diagnosis]:
     """Tell whether the rays of an organised cloud start beside the origin of its frame.
 
     With u z = f (x + t) + c z the pixels are linear in x, y, z and 1, also for small turns.
@@ -240,7 +244,7 @@ def _other_origin(points: NDArray[np.float32], settings: DiagnosisSettings) -> I
     drawn = points[::step, ::step].astype(np.float64)
     v, u = np.mgrid[: points.shape[0] : step, : points.shape[1] : step]
     measured = drawn[..., 2] > 0.0
-    if measured.sum() < MIN_POINTS:
+    if measured.sum() < min_points:
         return
     p, z = drawn[measured], drawn[measured][:, 2:]
     matrix = np.column_stack([p, np.ones(len(p))]) / z

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-GRID = 6  # points along each side of a cuboid, in its inside
-CLEAR = 0.02  # metres by which the lowest point seen may lie below the other object's top
-OVERLAP = 0.1  # share of a cuboid that cannot lie in another by an error of its sides
+from kmn_perception.scene.settings import StackingSettings
+
+GRID = 6  # points along each side of a cuboid, by which its volume is sampled
 
 
 def stands_on(
-    points: NDArray[np.float32], cubes: NDArray[np.float64], others: NDArray[np.float64]
+    points: NDArray[np.float32],
+    cubes: NDArray[np.float64],
+    others: NDArray[np.float64],
+    settings: StackingSettings,
 ) -> bool:
     """Tell whether an object seems to reach down into another one, of which it is seen above.
 
@@ -24,9 +27,9 @@ def stands_on(
     """
     for other in others:
         top = other[2, 3] + 0.5 * np.abs(other[2, :3]).sum()
-        if points[:, 2].min() < top - CLEAR:
+        if points[:, 2].min() < top - settings.clear:
             continue
-        if any(_share_inside(cube, other) > OVERLAP for cube in cubes):
+        if any(_share_inside(cube, other) > settings.overlap for cube in cubes):
             return True
     return False
 

@@ -22,7 +22,9 @@ from kmn_perception.experiments.labelled_frame import TABLE, LabelledFrame, read
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
-from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.scene.camera_pose import NoCameraPoseError
+from kmn_perception.scene.depth_view import DepthView
 from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
 from kmn_sim.sensors.kinect import Kinect, KinectSettings
 
@@ -94,7 +96,7 @@ def scene_of(
     estimator = pipeline.estimator
     points = depth_to_points(frame.depth, camera)
     try:
-        pose = pipeline.camera_pose(points)
+        pose = pipeline.camera_pose(DepthView(points, camera))
     except NoCameraPoseError:
         return None
     camera = replace(camera, pose=pose)

@@ -66,7 +66,22 @@ def test_a_narrow_gap_at_the_border_is_unknown(length: int, known: float) -> Non
     np.testing.assert_array_equal(free(row(seen, gap))[4:], known)
 
 
-def test_what_was_not_measured_is_presumed() -> None:
+@pytest.mark.parametrize("length, known", [(BORDER_RUN, UNKNOWN), (WIDE, EMPTY)])
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_narrow_gaps_at_the_top_and_the_bottom_are_unknown(
+    length: int, known: float, upside_down: bool
+) -> None:
+    column = row((NONE, HIGH, length), (0.7, HIGH, 12)).transpose(1, 0, 2)
+    image = np.ascontiguousarray(np.repeat(column[::-1] if upside_down else column, 20, axis=1))
+    nothing = np.full(image.shape[:2], -1, dtype=np.int32)
+    to_world = np.eye(4)[[1, 2, 0, 3]]
+    seen = free_space(image, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth
+    seen = seen[::-1] if upside_down else seen
+    np.testing.assert_array_equal(seen[:length], known)
+    np.testing.assert_allclose(seen[length:], 0.7)
+
+
+def test_what_was_not_measured_is_marked_as_interpolated() -> None:
     points = row((0.7, HIGH, 1), (NONE, HIGH, 2))
     around = free_space(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
     np.testing.assert_array_equal(around.interpolated, [[False, True, True]])
@@ -83,10 +98,12 @@ def test_an_object_touches_the_border_or_a_narrow_gap_beside_it(column: int, tou
     mask = np.zeros(free_depth.shape, dtype=np.bool_)
     mask[4, column] = True
     assert is_truncated(mask, free_depth) == touches
+    upright = np.ascontiguousarray(mask.T), np.ascontiguousarray(free_depth.T)
+    assert is_truncated(*upright) == touches
 
 
 @pytest.mark.parametrize("hidden", [0.2, 0.35, 0.5])
-def test_what_an_occluder_hides_is_left_open_and_does_not_bend_the_fit(hidden: float) -> None:
+def test_what_an_occluder_hides_is_left_uncertain_and_does_not_bend_the_fit(hidden: float) -> None:
     model, settings = KinematicModel.load("box"), RefinementSettings.load()
     camera = Camera.load("kinect_v1")
     camera = replace(camera, pose=model.camera.pose)
@@ -106,7 +123,7 @@ def test_what_an_occluder_hides_is_left_open_and_does_not_bend_the_fit(hidden: f
     assert np.abs(known.values - truth)[[2, 5]].max() < 2e-3  # yaw and height are in view
     assert _far(known, truth) < CHI_SQUARED < _far(blind, truth)
     sides = np.sqrt(np.diag(known.covariance))[3:5]
-    assert sides.max() > 0.02  # the hidden end is open
+    assert sides.max() > 0.02  # the hidden end is unobservable
 
 
 def _far(fit: Refinement, truth: NDArray[np.float64]) -> float:

@@ -1,0 +1,105 @@
+"""Lens distortion: raw depth images become those of a pinhole camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.model.camera import Camera
+
+COEFFICIENTS = {  # of the models of sensor_msgs/CameraInfo, and how many each may have
+    "plumb_bob": (4, 5),
+    "rational_polynomial": (8, 12, 14),
+    "equidistant": (4,),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """How a raw image deviates from that of a pinhole camera.
+
+    Attributes
+    ----------
+    model
+        ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
+    coefficients
+        As OpenCV orders them.
+    camera
+        The raw image's camera matrix and size.
+
+    Raises
+    ------
+    ValueError
+        If the model is not known, or has another number of coefficients.
+    """
+
+    model: str
+    coefficients: tuple[float, ...]
+    camera: Camera
+
+    def __post_init__(self) -> None:
+        counts = COEFFICIENTS.get(self.model)
+        if counts is None:
+            known = ", ".join(COEFFICIENTS)
+            raise ValueError(f"distortion model '{self.model}' is not known, expected {known}")
+        if len(self.coefficients) not in counts or not np.isfinite(self.coefficients).all():
+            raise ValueError(
+                f"distortion model '{self.model}' has coefficients {list(self.coefficients)}, "
+                f"expected {' or '.join(map(str, counts))} finite numbers"
+            )
+
+
+def rectify(
+    depth: NDArray[np.float32], distortion: Distortion, camera: Camera
+) -> NDArray[np.float32]:
+    """Return the depth image of a pinhole camera from a raw one.
+
+    Every pixel takes the depth of the raw pixel that looks along (nearly) the same ray: depths are
+    not averaged, for in between there may be an edge.
+
+    Parameters
+    ----------
+    depth
+        (height, width) of the raw image, metres, NaN for none.
+    camera
+        The pinhole camera.
+
+    Returns
+    -------
+    depth
+        (height, width) of the camera's image; NaN also where the raw image does not reach.
+    """
+    raw = distortion.camera
+    rows, columns, inside = _raw_pixels(
+        distortion.model,
+        distortion.coefficients,
+        (raw.fx, raw.fy, raw.cx, raw.cy, raw.width, raw.height),
+        (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height),
+    )
+    rectified = depth[rows, columns]
+    rectified[~inside] = np.nan
+    return rectified
+
+
+@lru_cache(maxsize=4)
+def _raw_pixels(
+    model: str,
+    coefficients: tuple[float, ...],
+    raw: tuple[float, float, float, float, int, int],
+    target: tuple[float, float, float, float, int, int],
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+    """Return row and column of the raw pixel for each of the target's, and whether it is inside."""
+    before, after = (
+        np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+        for fx, fy, cx, cy, *_ in (raw, target)
+    )
+    is_fisheye = model == "equidistant"
+    rectify_map = (cv2.fisheye if is_fisheye else cv2).initUndistortRectifyMap
+    u, v = rectify_map(before, np.array(coefficients), np.eye(3), after, target[4:], cv2.CV_32FC1)
+    columns, rows = np.rint(u).astype(np.intp), np.rint(v).astype(np.intp)
+    inside = (columns >= 0) & (columns < raw[4]) & (rows >= 0) & (rows < raw[5])
+    return np.where(inside, rows, 0), np.where(inside, columns, 0), inside

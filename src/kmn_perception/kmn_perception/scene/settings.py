@@ -1,0 +1,97 @@
+"""Settings of the scene's analysis, read from ``config/scene.yaml``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.settings import Count, Fraction, NonNegative, load_settings
+
+
+class ConcaveEdgeSettings(NamedTuple):
+    """Pixels to both sides whose mean points make the angle, and around them for the mean."""
+
+    leg: Count
+    reach: Count
+
+
+@dataclass(frozen=True)
+class OcclusionSettings:
+    """When two parts of an image are one object behind another one.
+
+    Attributes
+    ----------
+    min_rows
+        Rows in which the parts lie on both sides of the same nearer thing.
+    same_height, top
+        By which their tops may differ (metres), and the quantile of the points' heights that counts
+        as the top.
+    """
+
+    min_rows: Count
+    same_height: NonNegative
+    top: Fraction
+
+
+@dataclass(frozen=True)
+class StackingSettings:
+    """When an object seems to stand on another one.
+
+    Attributes
+    ----------
+    clear
+        By which its lowest point may lie below the other one's top, metres.
+    overlap
+        Share of it that lies inside the other one, more than an error of a side explains.
+    """
+
+    clear: NonNegative
+    overlap: Fraction
+
+
+@dataclass(frozen=True)
+class IntrinsicsSettings:
+    """How the camera of a cloud is found from its points.
+
+    Attributes
+    ----------
+    min_points, stride
+        Fewer points tell nothing; of more, every so many pixels are taken.
+    tolerance
+        Largest distance of a point from its pixel, pixels.
+    max_coarsening, dense
+        For unorganised points: by how much the canonical camera's image may become coarser, until
+        this share of the pixels with a point have a neighbour with one.
+    """
+
+    min_points: Count
+    stride: Count
+    tolerance: NonNegative
+    max_coarsening: Count
+    dense: Fraction
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """All of the file.
+
+    Attributes
+    ----------
+    border_run
+        Pixels at the image's border that a sensor may not measure at all.
+    memory
+        Frames for which an object that is not seen keeps its number.
+    """
+
+    border_run: Count
+    memory: Count
+    concave_edges: ConcaveEdgeSettings
+    occlusion: OcclusionSettings
+    stacking: StackingSettings
+    intrinsics: IntrinsicsSettings
+
+    @classmethod
+    def load(cls) -> SceneSettings:
+        """Read ``config/scene.yaml``."""
+        return load_settings(cls, resources.find("config", "scene"))

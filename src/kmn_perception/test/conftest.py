@@ -40,8 +40,13 @@ def real_frame(request: pytest.FixtureRequest) -> RealFrame:
 
 def tabletop_pipeline() -> MorphPipeline:
     """Return the pipeline of morph_node for boxes on a table; nothing of it is compiled yet."""
+    return shipped_pipeline("morph_node", "morph_node_tabletop")
+
+
+def shipped_pipeline(*names: str) -> MorphPipeline:
+    """Return the pipeline of morph_node with parameter files, the later over the earlier."""
     values = {}
-    for name in ("morph_node", "morph_node_tabletop"):
+    for name in names:
         file = yaml.safe_load(resources.find("config/nodes", name).read_text())
         values.update(file["/**"]["ros__parameters"])
     settings = MorphNodeSettings.check(values)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import CameraInfo
 
-from kmn_perception.ros.messages import camera_from_info
+from kmn_perception.ros.messages import MessageError, camera_from_info
 from kmn_perception.ros.reports import make_status
 from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.sensor_diagnosis import (
@@ -49,10 +50,7 @@ class SensorWatch:
         if now < self._next:
             return []
         self._next = now + self._period
-        described = Description(frame=view.frame)
-        if info is not None and (view.camera is not None or info.header.frame_id == view.frame):
-            camera = view.camera or camera_from_info(info)
-            described = Description(camera, view.frame, info.header.frame_id)
+        described = _description(view, info)
         self._newest = diagnose(view.points, described, self._settings, self._intrinsics)
         return self._newest
 
@@ -61,3 +59,14 @@ class SensorWatch:
         newest = self._newest
         message = "; ".join(found.text for found in newest) or "nothing wrong was recognised"
         return make_status(name, bool(newest), message, {found.key: found.text for found in newest})
+
+
+def _description(view: DepthView, info: CameraInfo | None) -> Description:
+    """Return what is said about the sensor; of a cloud's only if it is of the cloud's frame."""
+    if info is None or (view.camera is None and info.header.frame_id != view.frame):
+        return Description(frame=view.frame)
+    camera = view.camera
+    if camera is None:
+        with suppress(MessageError):  # is refused where it is used
+            camera = camera_from_info(info)
+    return Description(camera, view.frame, info.header.frame_id)

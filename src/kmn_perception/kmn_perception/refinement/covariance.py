@@ -77,15 +77,15 @@ def _less_observable(problem: Problem, fit: Fit, pair: NDArray[np.float64]) -> N
     """Return a pair of directions (P, 2), or their sum and difference if one of these is longer.
 
     Where only one end of an object is hidden, neither its size nor its place alone is unobservable,
-    only both together. The pair is scaled so that both move the surface equally far. Mostly the
-    view shows at once that neither sum nor difference is unobservable; integrating is slow.
+    only both together. The pair is scaled so that both move the surface equally far. Usually a look
+    at the ends shows that neither sum nor difference is unobservable; integrating would be slow.
     """
     half_range = problem.half_range[:, None]
     pixels = problem.pixels_per_unit(fit.values)[:, None]
     equal = pair / np.linalg.norm(pixels * half_range * pair, axis=0)
     rotated = np.column_stack([equal[:, 0] + equal[:, 1], equal[:, 0] - equal[:, 1]])
     rotated /= np.linalg.norm(rotated, axis=0)
-    if not any(_may_be_unobservable(problem, fit, way) for way in (half_range * rotated).T):
+    if not any(_may_be_unobservable(problem, fit, axis) for axis in (half_range * rotated).T):
         return pair
     variances = [
         max(
@@ -103,7 +103,7 @@ def _may_be_unobservable(problem: Problem, fit: Fit, direction: NDArray[np.float
     max_loss = loss(0.0) + problem.settings.unobservable.loss_rise
     low, high = _reach(problem, fit.values, direction)
     far = problem.settings.unobservable.deviation
-    return any(low <= distance <= high and loss(distance) <= max_loss for distance in (-far, far))
+    return any(low <= end <= high and loss(end) <= max_loss for end in (-far, far))
 
 
 def _marginal(

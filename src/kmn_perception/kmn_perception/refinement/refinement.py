@@ -89,13 +89,13 @@ def _refined(
     fits = [_fit_with_misfit(problem, values) for values in starts]
     iterations = sum(candidate.steps for candidate, _ in fits)
     best, misfit = min(fits, key=lambda pair: pair[1])
-    if misfit > settings.bad:
+    if misfit > settings.retry_above:
         for values in (best.values, start):
             candidate, candidate_misfit = _fit_with_misfit(problem, _scan(problem, values))
             iterations += candidate.steps
             if candidate_misfit < misfit:
                 best, misfit = candidate, candidate_misfit
-    if misfit > settings.wrong:
+    if misfit > settings.reject_above:
         values, covariance = best.values, _uniform_covariance(model)
     else:
         values, covariance = with_covariance(problem, best)
@@ -109,7 +109,7 @@ def _refined(
             return _unrefined(model, start, before, iterations, reason)
         values, covariance, misfit = start, covariance + np.outer(error, error), before
     reason = ""
-    if misfit > settings.wrong:
+    if misfit > settings.reject_above:
         reason = f"the model explains {misfit:.0%} of the observation wrongly"
     return Refinement(values, covariance, misfit, iterations, improved, reason)
 

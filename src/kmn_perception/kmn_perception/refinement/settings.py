@@ -177,9 +177,9 @@ class MisfitSettings(NamedTuple):
         A difference in depth (metres) that counts as much as a pixel on the wrong side.
     digits
         Decimals to which the misfit is rounded, so that rounding of the points does not decide.
-    bad
+    retry_above
         Above this misfit, other starts are tried.
-    wrong
+    reject_above
         Above this misfit, the result is not to be trusted.
     """
 
@@ -188,8 +188,8 @@ class MisfitSettings(NamedTuple):
     max_area: Count
     depth: Annotated[float, Field(gt=0.0, le=10.0)]
     digits: Annotated[int, Field(ge=1, le=15)]
-    bad: NonNegative
-    wrong: NonNegative
+    retry_above: NonNegative
+    reject_above: NonNegative
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The refinement finds the truth, keeps to what was seen, and says when it cannot."""
+"""The refinement finds the truth, explains what was seen, and says when it cannot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ IN_VIEW = {
     "box_c": [0.05, 0.1, -0.5, -0.2, 0.6],
     "box": [0.1, 0.05, 0.3, 0.2, -0.4, 0.5],
     "door": [0.6, 0.1, 0.3, -0.3, 0.1, 0.02, -0.05],
-}  # wholly in view of the canonical cameras
+}  # entirely in view of the canonical cameras
 
 
 def seen(model: KinematicModel, values: Vector, noise: str = "none") -> Observation:
@@ -71,7 +71,7 @@ def test_noise_of_a_kinect_leaves_millimetres() -> None:
 
 
 @pytest.mark.parametrize("position", [(0.7, -0.4, 0.6), (-0.6, 0.5, 0.7), (0.0, -0.3, 1.2)])
-def test_any_place_of_the_sensor_serves(position: tuple[float, float, float]) -> None:
+def test_the_sensor_may_be_anywhere(position: tuple[float, float, float]) -> None:
     model = KinematicModel.load("box")
     truth = np.array(IN_VIEW["box"])
     camera = replace(model.camera, pose=look_at(position, [0.1, 0.05, 0.1]), fx=525.0, fy=525.0)
@@ -80,7 +80,7 @@ def test_any_place_of_the_sensor_serves(position: tuple[float, float, float]) ->
     np.testing.assert_allclose(result.values, truth, atol=1e-3)
 
 
-def test_points_lost_with_the_floor_do_not_shorten_a_box() -> None:
+def test_points_removed_with_the_floor_do_not_shorten_a_box() -> None:
     model = KinematicModel.load("box")
     truth = np.array(IN_VIEW["box"])
     whole = seen(model, truth)
@@ -90,7 +90,7 @@ def test_points_lost_with_the_floor_do_not_shorten_a_box() -> None:
 
 
 def test_a_handle_that_the_start_has_lost_is_found() -> None:
-    """The start puts it further off than its own size (0.12 x 0.05 m)."""
+    """The start is off by more than its size (0.12 x 0.05 m)."""
     model = KinematicModel.load("door")
     truth = np.array([0.6, 0.1, 0.3, -0.3, 0.1, 0.035, -0.08])
     start = truth.copy()
@@ -109,12 +109,12 @@ def test_no_start_is_needed(name: str) -> None:
 
 
 def misfit_of(model: KinematicModel, observation: Observation, values: Vector) -> float:
-    """Return the common misfit of values that are not refined."""
+    """Return the misfit of values that are not refined."""
     return Problem.of(model, observation, SETTINGS).final_misfit(values)
 
 
 def nonsense(case: str) -> tuple[KinematicModel, Observation, Vector]:
-    """Return what the model does not fit."""
+    """Return a model, an observation that it does not fit (or a start that is far off), a start."""
     door, box = KinematicModel.load("door"), KinematicModel.load("box_c")
     truth = np.array(IN_VIEW["door"])
     observation = seen(door, truth)
@@ -135,7 +135,7 @@ def nonsense(case: str) -> tuple[KinematicModel, Observation, Vector]:
 
 @pytest.mark.parametrize("case", ["start", "half", "scattered", "box", "noise"])
 def test_the_result_is_never_worse_than_its_start(case: str) -> None:
-    """Nor is it far beyond the limits, nor without a reason where nothing fits."""
+    """It stays near the limits, and has a reason where nothing fits."""
     model, observation, start = nonsense(case)
     result = refine(model, observation, start, SETTINGS)
     assert np.isfinite(result.values).all()
@@ -190,8 +190,9 @@ def test_samples_of_the_evaluation_come_out_exactly() -> None:
     ("old", "new", "message"),
     [
         ("damping: 0.01", "damping: -1", "'damping' must be greater than or equal to 0, found -1"),
-        ("tries: ", "attempts: ", "reacquire: key 'tries' is missing"),
+        ("candidates: ", "places: ", "reacquisition: key 'candidates' is missing"),
         ("window: 32", "window: 3200", r"search\[0\]: 'window' must be less than or equal to 64"),
+        ("digits: 6", "digits: 6.5", "misfit: 'digits' must be a whole number, found 6.5"),
     ],
 )
 def test_wrong_settings_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -200,4 +201,14 @@ def test_wrong_settings_are_refused(tmp_path: Path, old: str, new: str, message:
     file = tmp_path / "mine.yaml"
     file.write_text(content.replace(old, new))
     with pytest.raises(ConfigurationError, match=message):
+        RefinementSettings.load(file)
+
+
+def test_a_search_without_levels_is_refused(tmp_path: Path) -> None:
+    content = (resources.share_directory() / "config/refinement.yaml").read_text()
+    levels = [line for line in content.splitlines() if line.startswith("  - {window")]
+    file = tmp_path / "mine.yaml"
+    content = content.replace("\n".join(levels), "  []")
+    file.write_text(content)
+    with pytest.raises(ConfigurationError, match="'search' .* at least 1 item"):
         RefinementSettings.load(file)

@@ -1,4 +1,4 @@
-"""The covariance says what a view does not show, and is neither too small nor too large."""
+"""The covariance tells what a view does not show, and is neither too small nor too large."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def test_a_door_whose_top_is_out_of_view_shows_only_height_and_handle_together()
     assert certain @ result.values == pytest.approx(certain @ truth, abs=5e-4)
 
 
-def test_the_estimate_lies_amid_what_is_possible() -> None:
-    """The top is above the image's upper border and the handle within its limits."""
+def test_the_estimate_is_the_middle_of_what_is_possible() -> None:
+    """The top is above the upper border of the image, and the handle within its limits."""
     door = KinematicModel.load("door")
     truth = np.array([-0.5, 0.0, 0.2, 0.1, 0.0, 0.01, 0.02])
     observation = observe(door, truth, door.camera, "none", np.random.default_rng(0))
@@ -60,9 +60,7 @@ def test_a_box_with_one_end_out_of_view_may_be_longer() -> None:
     box = KinematicModel.load("box_c")
     truth = np.array([-0.325, -0.35, 0.07, 0.02, 0.23])
     observation = observe(box, truth, box.camera, "none", np.random.default_rng(0))
-    points = observation.points @ box.camera.world_to_camera[:3, :3].T
-    points += box.camera.world_to_camera[:3, 3]
-    lowest = (points[:, 1] / points[:, 2] * box.camera.fy + box.camera.cy).max()
+    lowest = box.camera.project(observation.points)[:, 1].max()
     assert lowest == pytest.approx(box.camera.height - 1, abs=0.01)
     result = refine(box, observation, truth + 0.01, SETTINGS)
     eigenvalues, directions = np.linalg.eigh(result.covariance)
@@ -82,7 +80,7 @@ def test_a_box_with_one_end_out_of_view_may_be_longer() -> None:
         ("door", [0.6, 0.1, 0.3, -0.3, 0.1, 0.02, -0.05]),
     ],
 )
-def test_what_is_wholly_in_view_is_certain(name: str, values: list[float]) -> None:
+def test_an_object_entirely_in_view_is_certain(name: str, values: list[float]) -> None:
     model = KinematicModel.load(name)
     truth = np.array(values)
     observation = observe(model, truth, model.camera, "none", np.random.default_rng(0))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
-from kmn_perception.refinement.geometry import shape_of, unit_cubes_jacobian
-from kmn_perception.refinement.view import model_view, raycast_any
+from kmn_perception.refinement.geometry import cuboids, shape_of
+from kmn_perception.refinement.solids import FACES_CAMERA, PLANES, raycast_any
+from kmn_perception.refinement.view import ModelView, model_view
 
 Vector = NDArray[np.float64]
 
@@ -61,11 +62,16 @@ def within(model: KinematicModel, shares: list[float]) -> Vector:
     return low + np.resize(shares, len(low)) * (high - low)
 
 
-def slope(function: Callable[[Vector], Vector], values: Vector, step: float = 1e-6) -> Vector:
+def derivative(function: Callable[[Vector], Vector], values: Vector, step: float = 1e-6) -> Vector:
     """Return the derivative (..., P) of an array by central differences."""
     steps = np.eye(len(values)) * step
     columns = [(function(values + s) - function(values - s)) / (2.0 * step) for s in steps]
     return np.stack(columns, axis=-1)
+
+
+def planes(view: ModelView) -> Vector:
+    """Return q of the faces (B, 6, 3), see `view`."""
+    return view.solids[:, PLANES:FACES_CAMERA].reshape(-1, 6, 3)
 
 
 shares = st.lists(st.floats(0.05, 0.95), min_size=7, max_size=7)
@@ -77,11 +83,10 @@ def test_unit_cubes_move_as_finite_differences_say(
     model: KinematicModel, share: list[float]
 ) -> None:
     values = within(model, share)
-    np.testing.assert_allclose(
-        unit_cubes_jacobian(model, values),
-        slope(lambda v: model.unit_cubes(*model.split(v)), values),
-        atol=1e-8,
-    )
+    cubes, jacobians = cuboids(shape_of(model), values)
+    np.testing.assert_allclose(cubes, model.unit_cubes(*model.split(values))[:, :3], atol=1e-12)
+    expected = derivative(lambda v: model.unit_cubes(*model.split(v))[:, :3], values)
+    np.testing.assert_allclose(jacobians, expected, atol=1e-8)
 
 
 @settings(max_examples=20)
@@ -89,16 +94,11 @@ def test_unit_cubes_move_as_finite_differences_say(
 def test_planes_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
     values, shape, matrix = within(model, share), shape_of(model), model.camera.projection
     view = model_view(shape, values, matrix)
-    offsets = np.linalg.norm(view.solids[:, 4:22].reshape(-1, 6, 3)[..., :2], axis=-1)
-    seen_well = offsets < 0.1  # a face that is seen exactly from the side has no slope
-
-    def planes(v: Vector) -> Vector:
-        return model_view(shape, v, matrix).solids[:, 4:22].reshape(-1, 6, 3)
-
-    expected = slope(planes, values, 1e-7)
-    scale = 1.0 + np.abs(expected)
-    difference = (view.plane_slopes - expected) / scale
-    assert np.abs(difference[seen_well]).max() < 1e-4
+    steepness = np.linalg.norm(planes(view)[..., :2], axis=-1)
+    not_edge_on = steepness < 0.1  # a face that is seen exactly edge-on has no derivative
+    expected = derivative(lambda v: planes(model_view(shape, v, matrix)), values, 1e-7)
+    difference = (view.plane_jacobians - expected) / (1.0 + np.abs(expected))
+    assert np.abs(difference[not_edge_on]).max() < 1e-4
 
 
 @settings(max_examples=20)
@@ -118,23 +118,23 @@ def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list
     np.testing.assert_allclose(distances(values)[shown], 0.0, atol=1e-6)
     ends = np.stack([view.ends[..., :2], view.ends[..., 2:]], axis=2)
     ends = np.concatenate([ends, np.ones_like(ends[..., :1])], axis=-1)
-    analytic = np.einsum("beki,beip->bekp", ends, view.line_slopes)
-    expected = slope(distances, values, 1e-7)
+    analytic = np.einsum("beki,beip->bekp", ends, view.line_jacobians)
+    expected = derivative(distances, values, 1e-7)
     np.testing.assert_allclose(analytic[shown], expected[shown], rtol=1e-3, atol=1e-2)
 
 
 @settings(max_examples=20)
 @given(shares)
-def test_rays_meet_what_the_renderer_sees(model: KinematicModel, share: list[float]) -> None:
+def test_raycasts_agree_with_the_renderer(model: KinematicModel, share: list[float]) -> None:
     values, camera = within(model, share), model.camera.resized(64, 48)
     depth = render(model.unit_cubes(*model.split(values)), camera)
     view = model_view(shape_of(model), values, camera.projection)
-    met = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
-    np.testing.assert_array_equal(met > 0.0, np.isfinite(depth))
-    np.testing.assert_allclose(1.0 / met[met > 0.0], depth[met > 0.0], rtol=1e-5)
+    cast = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
+    np.testing.assert_array_equal(cast > 0.0, np.isfinite(depth))
+    np.testing.assert_allclose(1.0 / cast[cast > 0.0], depth[cast > 0.0], rtol=1e-5)
 
 
-def test_a_box_seen_from_above_has_the_silhouette_of_its_outline() -> None:
+def test_a_box_seen_from_above_has_the_silhouette_of_its_contour() -> None:
     """The camera of the boxes sees the front and the top of a box that stands before it."""
     box = KinematicModel.load("box_b")
     view = model_view(shape_of(box), np.zeros(3), box.camera.projection)
@@ -144,8 +144,7 @@ def test_a_box_seen_from_above_has_the_silhouette_of_its_outline() -> None:
         @ np.array([[sx, sy, sz, 2.0] for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]).T
         / 2.0
     )
-    points = box.camera.projection @ corners
-    pixels = (points[:2] / points[2]).T
+    pixels = box.camera.project(corners.T[:, :3])[:, :2]
     inside = np.concatenate([pixels.mean(axis=0), [1.0]])
     for edge in np.flatnonzero(view.faces[0] >= 0):
         line = view.lines[0, edge]

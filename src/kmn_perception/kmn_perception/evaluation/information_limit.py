@@ -1,18 +1,18 @@
-"""What no method could know: the parameters that the image of an observation leaves open."""
+"""What no method could know: the parameters that an image does not show."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.evaluation.observability import null_directions
+from kmn_perception.evaluation.observability import unobservable_directions
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
 
 SAME_DEPTH = 1e-5  # metres; above the rounding of single precision
 PRECISION = 1e-3  # of the interval that the limits leave along a direction
-PASSES = 2  # the middle along one open direction can shift that along another
+PASSES = 2  # the middle along one unobservable direction can shift that along another
 
 
 def best_estimate(
@@ -20,12 +20,12 @@ def best_estimate(
 ) -> NDArray[np.float64]:
     """Return the middle (n + m,) of all parameters that look the same as the truth.
 
-    This is the best that can be done: of all that looks the same, within the limits, its expected
-    absolute error is least. What is hidden from an exact and complete depth image counts: beyond
-    its border, or behind other parts. What holes and noise hide does not.
+    This is the best possible estimate: of all parameters within the limits that look the same, it
+    has the minimum expected absolute error. Hidden is what an exact and complete depth image does
+    not show, because it is outside the image or behind other bodies; not what holes and noise hide.
     """
     image = render(model.unit_cubes(*model.split(truth)), camera)
-    directions = null_directions(model, camera, truth, image)
+    directions = unobservable_directions(model, camera, truth, image)
     middle = truth.copy()
     for _ in range(PASSES if len(directions) > 1 else 1):
         for direction in directions:
@@ -41,22 +41,26 @@ def _reach(
     start: NDArray[np.float64],
     direction: NDArray[np.float64],
 ) -> float:
-    """Return how far one can go along a direction within the limits and with the same image."""
+    """Return the maximum multiple of a direction, within the limits, that looks the same."""
     low, high = model.limits.T
     moving = direction != 0.0
     ahead = np.where(direction > 0.0, high, low)
-    most = float(((ahead - start)[moving] / direction[moving]).min())
-    good, bad = 0.0, most
-    if _same(image, render(model.unit_cubes(*model.split(start + most * direction)), camera)):
-        return most
-    while bad - good > PRECISION * most:
-        middle = (good + bad) / 2.0
-        values = start + middle * direction
-        if _same(image, render(model.unit_cubes(*model.split(values)), camera)):
-            good = middle
+    max_reach = float(((ahead - start)[moving] / direction[moving]).min())
+
+    def looks_same(reach: float) -> bool:
+        cubes = model.unit_cubes(*model.split(start + reach * direction))
+        return _same(image, render(cubes, camera))
+
+    if looks_same(max_reach):
+        return max_reach
+    same, different = 0.0, max_reach
+    while different - same > PRECISION * max_reach:
+        middle = (same + different) / 2.0
+        if looks_same(middle):
+            same = middle
         else:
-            bad = middle
-    return good
+            different = middle
+    return same
 
 
 def _same(first: NDArray[np.float32], second: NDArray[np.float32]) -> bool:

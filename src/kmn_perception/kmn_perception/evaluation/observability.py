@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,28 +15,34 @@ from kmn_perception.model.kinematic_model import KinematicModel
 
 EMPTY = -1
 DEPTH = 3
-RAYS = 24  # to each face and edge that is seen; a few would do
+RAYS = 24  # to each face and edge that is visible; a few would suffice
 STEP = 1e-3  # of finite differences, in half widths of the parameters
 ROUNDING = 1e-9  # smaller entries of directions are 0
 RANK_TOLERANCE = 1e-7  # singular values below it, relative to the largest, are rounding errors
 
 
-class Seen(NamedTuple):
+class Measurements(NamedTuple):
     """Points on faces, each a smooth function of the parameters for a ray that is held fixed.
 
-    ``bodies``, ``axes`` (K,) and ``sides`` (K,) +-0.5 say on which face of which unit cube;
-    ``rays`` (K, 3) in the optical frame with z = 1. ``shown`` (K,) is the coordinate that is seen:
-    0 to 2 in the cube's frame, where the ray meets an edge, or ``DEPTH``.
+    Attributes
+    ----------
+    bodies, axes, sides
+        (K,) the face: its unit cube, the axis of its normal, and +-0.5 along this axis.
+    rays
+        (K, 3) in the optical frame, with z = 1.
+    coordinates
+        (K,) the coordinate that is measured: 0 to 2 in the cube's frame where the ray meets an
+        edge, or ``DEPTH``.
     """
 
     bodies: NDArray[np.int64]
     axes: NDArray[np.int64]
     sides: NDArray[np.float64]
     rays: NDArray[np.float64]
-    shown: NDArray[np.int64]
+    coordinates: NDArray[np.int64]
 
 
-def null_directions(
+def unobservable_directions(
     model: KinematicModel,
     camera: Camera,
     values: NDArray[np.float64],
@@ -43,21 +50,21 @@ def null_directions(
 ) -> NDArray[np.float64]:
     """Return directions (k, n + m) in which (theta, gamma) changes nothing that a camera sees.
 
-    A face that is seen shows its depth, an edge in front of something farther shows its place.
-    Both are differentiated at fixed rays, where they are smooth, unlike the image itself. The
-    directions are sparse: each has a parameter of its own.
+    A visible face shows its depth, an edge in front of something farther shows its position. Both
+    are differentiated at fixed rays, where they are smooth, unlike the image itself. The directions
+    are sparse: each has a parameter that the others lack.
 
     Parameters
     ----------
     values
         (n + m,) true parameters.
     image
-        (height, width) their depth image, NaN where there is nothing.
+        (height, width) their depth image in metres, NaN where there is nothing.
     """
     half_width = np.ptp(model.limits, axis=1) / 2.0
     cubes = _LinearCubes(model, camera)
-    seen = _see(cubes(values), camera, np.isfinite(image))
-    jacobian = _differentiate(lambda at: _measure(cubes(at), seen), values, STEP * half_width)
+    measured = _measurements(cubes(values), camera, np.isfinite(image))
+    jacobian = _differentiate(lambda at: _measure(cubes(at), measured), values, STEP * half_width)
     _, singular, rows = np.linalg.svd(jacobian)
     rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
     return _sparse(rows[rank:]) * half_width
@@ -93,39 +100,46 @@ def _differentiate(
     return np.asarray(np.tensordot(weights, function(at + moved), axes=1).T, dtype=np.float64)
 
 
-def _measure(camera_to_cubes: NDArray[np.float64], seen: Seen) -> NDArray[np.float64]:
+def _measure(camera_to_cubes: NDArray[np.float64], measured: Measurements) -> NDArray[np.float64]:
     """Return the coordinate (..., K) that each ray shows where it meets the plane of its face."""
-    matrices = camera_to_cubes[..., seen.bodies, :3, :]
-    slopes = (matrices[..., :3] @ seen.rays[:, :, None])[..., 0]
+    matrices = camera_to_cubes[..., measured.bodies, :3, :]
+    slopes = (matrices[..., :3] @ measured.rays[:, :, None])[..., 0]
     origins = matrices[..., 3]
-    every = np.arange(len(seen.rays))
-    depths = (seen.sides - origins[..., every, seen.axes]) / slopes[..., every, seen.axes]
-    places = origins + depths[..., None] * slopes
-    return np.concatenate((places, depths[..., None]), axis=-1)[..., every, seen.shown]
+    every = np.arange(len(measured.rays))
+    distances = measured.sides - origins[..., every, measured.axes]
+    depths = distances / slopes[..., every, measured.axes]
+    points = origins + depths[..., None] * slopes
+    return np.concatenate((points, depths[..., None]), axis=-1)[..., every, measured.coordinates]
 
 
-def _see(camera_to_cubes: NDArray[np.float64], camera: Camera, covered: NDArray[np.bool_]) -> Seen:
+def _measurements(
+    camera_to_cubes: NDArray[np.float64], camera: Camera, covered: NDArray[np.bool_]
+) -> Measurements:
     """Find the faces and the edges that an image shows, and rays to each of them."""
-    intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
-    faces, depth = _cast(covered, camera_to_cubes, *intrinsics, camera.near)
+    rays = _pixel_rays(camera)
+    faces, depth = _raycast(covered, camera_to_cubes, rays, camera.near)
     inside = _spread(faces, 6 * len(camera_to_cubes), RAYS)
-    edges = _thin(_edges(faces, depth, camera_to_cubes, *intrinsics), RAYS)
+    edges = _thin(_edges(faces, depth, camera_to_cubes, rays), RAYS)
     face, edge, u, v = np.concatenate((inside, edges)).T
-    face, shown = face.astype(np.int64), edge.astype(np.int64) // 2
-    rays = np.column_stack(
-        ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(len(u)))
-    )
-    return Seen(face // 6, face % 6 // 2, face % 2 - 0.5, rays, shown)
+    face, coordinates = face.astype(np.int64), edge.astype(np.int64) // 2
+    return Measurements(face // 6, face % 6 // 2, face % 2 - 0.5, camera.rays(u, v), coordinates)
 
 
-def _thin(rows: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Keep up to ``most`` rows, evenly spread, of those that share their first two columns."""
+@lru_cache(maxsize=1)
+def _pixel_rays(camera: Camera) -> NDArray[np.float64]:
+    """Return the rays (height, width, 3) of all pixels; an evaluation has one camera."""
+    v, u = np.indices((camera.height, camera.width))
+    return camera.rays(u, v)
+
+
+def _thin(rows: NDArray[np.float64], max_count: int) -> NDArray[np.float64]:
+    """Select up to ``max_count`` rows, evenly spread, of those with the same first two columns."""
     kind = 8 * rows[:, 0] + rows[:, 1]
-    kept = []
+    selected = []
     for number in np.unique(kind):
         same = np.flatnonzero(kind == number)
-        kept.append(same[np.unique(np.linspace(0, len(same) - 1, most).astype(int))])
-    return rows[np.concatenate(kept)] if kept else rows
+        selected.append(same[np.unique(np.linspace(0, len(same) - 1, max_count).astype(int))])
+    return rows[np.concatenate(selected)] if selected else rows
 
 
 def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -140,13 +154,10 @@ def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, error_model="numpy")
-def _cast(
+def _raycast(
     covered: NDArray[np.bool_],
     camera_to_cubes: NDArray[np.float64],
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    rays: NDArray[np.float64],
     near: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the face 6 body + 2 axis + side and the depth that the covered pixels show."""
@@ -161,7 +172,7 @@ def _cast(
                 enter, leave, face = near, np.inf, EMPTY
                 for axis in range(3):
                     row = camera_to_cubes[body, axis]
-                    slope = row[0] * (u - cx) / fx + row[1] * (v - cy) / fy + row[2]
+                    slope = row[0] * rays[v, u, 0] + row[1] * rays[v, u, 1] + row[2]
                     side = 0 if slope > 0.0 else 1
                     first = (side - 0.5 - row[3]) / slope
                     leave = min(leave, (0.5 - side - row[3]) / slope)
@@ -175,8 +186,8 @@ def _cast(
 
 
 @njit(cache=True)
-def _spread(faces: NDArray[np.int64], count: int, most: int) -> NDArray[np.float64]:
-    """Return up to ``most`` pixels of each face, evenly spread: face, 2 ``DEPTH``, u, v."""
+def _spread(faces: NDArray[np.int64], count: int, max_count: int) -> NDArray[np.float64]:
+    """Return up to ``max_count`` pixels of each of ``count`` faces: face, 2 ``DEPTH``, u, v."""
     height, width = faces.shape
     pixels = np.zeros(count, dtype=np.int64)
     for face in faces.flat:
@@ -188,7 +199,8 @@ def _spread(faces: NDArray[np.int64], count: int, most: int) -> NDArray[np.float
         for u in range(width):
             face = faces[v, u]
             if face != EMPTY:
-                if seen[face] * most // pixels[face] != (seen[face] - 1) * most // pixels[face]:
+                share = seen[face] * max_count // pixels[face]
+                if share != (seen[face] - 1) * max_count // pixels[face]:
                     found.append((float(face), 2.0 * DEPTH, float(u), float(v)))
                 seen[face] += 1
     return np.array(found)
@@ -199,14 +211,11 @@ def _edges(
     faces: NDArray[np.int64],
     depth: NDArray[np.float64],
     camera_to_cubes: NDArray[np.float64],
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    rays: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return where edges lie in front of something farther: face, 2 axis + side, and pixel u, v.
+    """Return where edges are in front of something farther: face, 2 axis + side, and pixel u, v.
 
-    They are found between neighbours that show different bodies, exactly to rounding.
+    They are found between neighbouring pixels that show different bodies, exact up to rounding.
     """
     height, width = faces.shape
     found = [(0.0, 0.0, 0.0, 0.0) for _ in range(0)]
@@ -218,23 +227,17 @@ def _edges(
                 here, there = faces[v, u], faces[v + down, u + right]
                 if here == there or here // 6 == there // 6:
                     continue
-                nearer = depth[v, u] < depth[v + down, u + right]
-                face, sign = (here, 1.0) if nearer else (there, -1.0)
-                u0, v0 = (u, v) if nearer else (u + right, v + down)
+                if depth[v, u] < depth[v + down, u + right]:
+                    face, u0, v0, u1, v1 = here, u, v, u + right, v + down
+                else:
+                    face, u0, v0, u1, v1 = there, u + right, v + down, u, v
+                ray = rays[v0, u0]
                 edge, part = _crossing(
-                    camera_to_cubes[face // 6],
-                    face % 6,
-                    ((u0 - cx) / fx, (v0 - cy) / fy),
-                    (sign * right / fx, sign * down / fy),
+                    camera_to_cubes[face // 6], face % 6, ray, rays[v1, u1] - ray
                 )
                 if edge >= 0:
                     found.append(
-                        (
-                            float(face),
-                            float(edge),
-                            u0 + part * sign * right,
-                            v0 + part * sign * down,
-                        )
+                        (float(face), float(edge), u0 + part * (u1 - u0), v0 + part * (v1 - v0))
                     )
     return np.array(found).reshape(-1, 4)
 
@@ -243,13 +246,22 @@ def _edges(
 def _crossing(
     camera_to_cube: NDArray[np.float64],
     face: int,
-    ray: tuple[float, float],
-    step: tuple[float, float],
+    ray: NDArray[np.float64],
+    step: NDArray[np.float64],
 ) -> tuple[int, float]:
-    """Return which edge of a face, 2 axis + side, a ray meets first within a step, and where.
+    """Return which edge of a face, 2 axis + side, a moving ray crosses first, and where.
 
-    Where the ray is a fraction of the step on, both the face's plane and that of the edge's other
-    face are equally deep; the difference, freed of fractions, is linear in it.
+    Parameters
+    ----------
+    ray, step
+        (3,) a ray that meets the face, and by how much it moves, in the optical frame.
+
+    Returns
+    -------
+    edge, part
+        ``EMPTY`` if it crosses none, and the fraction of the step up to the crossing: there, the
+        planes of the face and of the edge's other face are equally deep, and the difference of
+        their depths, multiplied by both denominators, is linear in this fraction.
     """
     axis, origin = face // 2, camera_to_cube[:, 3]
     slope = np.empty(3)

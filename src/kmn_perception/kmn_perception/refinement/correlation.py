@@ -1,4 +1,4 @@
-"""How often residuals count that are not independent of each other."""
+"""The variance of a sum of residuals that are not independent of each other."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True, error_model="numpy")
-def correlated_count(sums: NDArray[np.float64], lags: int) -> float:
-    """Return the variance of the sum of the residuals of all rows, as those of each row show it.
+def newey_west_variance(sums: NDArray[np.float64], lags: int) -> float:
+    """Return the variance of the total of a sequence, estimated from the sequence itself.
+
+    The covariances of neighbours are weighted as by Newey and West (1987); this equals the mean
+    square of the sums of all runs of ``lags`` elements. It is at least the variance of independent
+    elements.
 
     Parameters
     ----------
     sums
-        (K,) sum of the residuals of each row.
+        (K,) sums of the residuals of consecutive rows, of mean 0.
     lags
-        So many neighbouring rows may be shifted alike, too. Their covariances are weighted as by
-        Newey and West, which the mean square of the sums of all runs of ``lags`` rows amounts to.
+        Number of neighbouring rows whose residuals may be correlated.
     """
-    alone, variance, window = 0.0, 0.0, 0.0
+    independent, variance, window = 0.0, 0.0, 0.0
     for i in range(sums.shape[0] + lags - 1):
         if i < sums.shape[0]:
-            alone += sums[i] ** 2
+            independent += sums[i] ** 2
             window += sums[i]
         if i >= lags:
             window -= sums[i - lags]
         variance += window**2
-    return float(max(alone, variance / lags))
+    return float(max(independent, variance / lags))

@@ -7,29 +7,38 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.edges import EdgeTerms, edge_terms
-from kmn_perception.refinement.planes import PlaneTerms, plane_terms
+from kmn_perception.refinement.edges import (
+    SEARCH_DEVIATIONS,
+    EdgeSampling,
+    EdgeTerms,
+    edge_terms,
+)
+from kmn_perception.refinement.image import Noise
+from kmn_perception.refinement.planes import PlaneSampling, PlaneTerms, plane_terms
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.reacquisition import reacquire
 from kmn_perception.refinement.settings import SearchSettings
 from kmn_perception.refinement.view import ModelView
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
-COARSE = 3.0  # the coarse search ignores depths beyond this many standard deviations
-ALL = 10**6  # samples of an edge
-SWING = 6  # after as many steps they are halved, lest they swing to and fro
-TENTH = 0.1  # pixels, and of the noise: what is less has settled
-
-
-class Noise(NamedTuple):
-    """Of the sensor: of the inverse depth (1 / m) and of the lateral position (pixels)."""
-
-    depth: float
-    lateral: float
+MAX_NOISE_CHANGE = 0.7  # of the logarithm of the lateral noise in a step
+UNLIMITED = 10**6  # samples of an edge
 
 
 class Fit(NamedTuple):
-    """Values, noise, the information (P, P) that depths and edges hold about them, and steps."""
+    """A fit of a model with P parameters.
+
+    Attributes
+    ----------
+    values
+        (P,) of the parameters.
+    noise
+        Of the sensor, as estimated.
+    depth_information, edge_information
+        (P, P) what the depths and the edges tell about the values.
+    steps
+        Number of Gauss-Newton steps.
+    """
 
     values: NDArray[np.float64]
     noise: Noise
@@ -40,16 +49,16 @@ class Fit(NamedTuple):
 
 def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     """Fit from a start: a coarse search that narrows, then down to the noise of the sensor."""
-    search = problem.settings.search
-    for level in search:
+    settings = problem.settings
+    for level in settings.search:
         values = _search(problem, values, level)
-    caught = reacquire(
-        problem.shape, problem.image, problem.limits, values, *problem.settings.reacquire
+    steps = sum(level.steps for level in settings.search)
+    reacquired = reacquire(
+        problem.shape, problem.image, problem.limits, values, settings.reacquisition
     )
-    steps = sum(level.steps for level in search)
-    if caught is not values:
-        values = _search(problem, caught, search[-1])
-        steps += search[-1].steps
+    if reacquired is not values:
+        values = _search(problem, reacquired, settings.search[-1])
+        steps += settings.search[-1].steps
     return _fit_finely(problem, values, steps)
 
 
@@ -57,78 +66,96 @@ def _search(
     problem: Problem, values: NDArray[np.float64], level: SearchSettings
 ) -> NDArray[np.float64]:
     """Take the steps of one level of the coarse search."""
-    stride = problem.stride(problem.settings.depth_pixels)
-    noise = level.depth / COARSE * problem.steepness
+    settings = problem.settings
+    noise = level.depth / SEARCH_DEVIATIONS * problem.inverse_depth_per_metre
+    plane_sampling = PlaneSampling(
+        noise=Noise(noise, 0.0),
+        stride=problem.stride(settings.depth_pixels),
+        robust=SEARCH_DEVIATIONS,
+        border=0.0,
+        correlated_rows=settings.correlated_rows,
+    )
+    edge_sampling = EdgeSampling(
+        noise=Noise(noise / SEARCH_DEVIATIONS, 0.0),
+        window=level.window,
+        border=0.0,
+        max_samples=level.samples,
+    )
     for _ in range(level.steps):
         view = problem.view(values)
-        planes = plane_terms(view, problem.image, stride, noise, 0.0, COARSE, 0.0)
-        edges = edge_terms(
-            view,
-            problem.image,
-            problem.settings.edges,
-            level.window,
-            0.0,
-            noise / COARSE,
-            0.0,
-            level.samples,
-        )
-        values = problem.kept(values + _step(problem, values, planes, edges)[0])
+        planes = plane_terms(view, problem.image, plane_sampling)
+        edges = edge_terms(view, problem.image, settings.edges, edge_sampling)
+        values = problem.clipped(values + _step(problem, values, planes, edges)[0])
     return values
 
 
 def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fit:
-    """Fit to the noise of the sensor, which is estimated as well."""
+    """Fit down to the noise of the sensor, which is estimated as well."""
     settings = problem.settings.fine
-    least = Noise(settings.min_depth_noise * problem.steepness, settings.min_noise)
-    depth = problem.settings.search[-1].depth / COARSE * problem.steepness
-    noise = Noise(depth, settings.noise)
+    per_metre = problem.inverse_depth_per_metre
+    min_noise = Noise(settings.min_depth_noise * per_metre, settings.min_noise)
+    noise = Noise(problem.settings.search[-1].depth / SEARCH_DEVIATIONS * per_metre, settings.noise)
     for pixels in (problem.settings.depth_pixels, settings.depth_pixels):
-        stride = problem.stride(pixels)
         for k in range(settings.steps):
             view = problem.view(values)
-            planes = plane_terms(
-                view, problem.image, stride, *noise, settings.robust, settings.border * noise[1]
-            )
+            planes = _fine_planes(problem, view, noise, pixels)
             edges = fine_edges(problem, view, noise, settings.border)
-            step, moved = _step(problem, values, planes, edges)
-            values = problem.kept(values + step / (1 + k // SWING))
+            step, movement = _step(problem, values, planes, edges)
+            values = problem.clipped(values + step / (1 + k // settings.shorten_after))
             steps += 1
             before = noise
-            noise = _estimate_noise(noise, least, planes, edges, settings.noise)
+            noise = _estimate_noise(noise, min_noise, planes, edges, settings.noise)
             change = np.abs(np.log(np.divide(noise, before))).max()
-            if moved < settings.tolerance * max(noise.lateral, TENTH) and change < TENTH:
+            tolerance = settings.tolerance * max(noise.lateral, settings.min_tolerance_noise)
+            if movement < tolerance and change < settings.noise_tolerance:
                 break
-        if noise.depth == least.depth:
+        if noise.depth == min_noise.depth:
             break  # exact depths: more of them tell nothing new
     return Fit(values, before, planes.hessian, edges.information, steps)
 
 
+def _fine_planes(problem: Problem, view: ModelView, noise: Noise, pixels: int) -> PlaneTerms:
+    """Compare about this many of the observed pixels with the faces."""
+    settings = problem.settings
+    sampling = PlaneSampling(
+        noise=noise,
+        stride=problem.stride(pixels),
+        robust=settings.fine.robust,
+        border=settings.fine.border * noise.lateral,
+        correlated_rows=settings.correlated_rows,
+    )
+    return plane_terms(view, problem.image, sampling)
+
+
+def fine_edges(problem: Problem, view: ModelView, noise: Noise, border: float) -> EdgeTerms:
+    """Return the likelihood of the pixels beside the edges.
+
+    Parameters
+    ----------
+    border
+        Pixels closer than this to the ends of the edges are left out, in units of the lateral
+        noise.
+    """
+    settings = problem.settings.fine
+    sampling = EdgeSampling(
+        noise=noise,
+        window=max(settings.min_window, settings.window * noise.lateral),
+        border=border * noise.lateral,
+        max_samples=UNLIMITED,
+    )
+    return edge_terms(view, problem.image, problem.settings.edges, sampling)
+
+
 def _estimate_noise(
-    noise: Noise, least: Noise, planes: PlaneTerms, edges: EdgeTerms, most: float
+    noise: Noise, min_noise: Noise, planes: PlaneTerms, edges: EdgeTerms, max_lateral: float
 ) -> Noise:
-    """Return the noise that is likely, given what was found with the noise assumed."""
+    """Return the most likely noise, given the residuals under the noise that was assumed."""
     depth = noise.depth
     if len(planes.residuals):
         depth *= MEDIAN_TO_SIGMA * float(np.median(np.abs(planes.residuals)))
     change = -edges.noise_gradient / max(edges.noise_information, 1.0)
-    lateral = noise.lateral * float(np.exp(np.clip(change, -0.7, 0.7)))
-    return Noise(max(depth, least.depth), min(max(lateral, least.lateral), most))
-
-
-def fine_edges(problem: Problem, view: ModelView, noise: Noise, border: float) -> EdgeTerms:
-    """Return the likelihood of the pixels beside the edges, but ``border`` s from their ends."""
-    fine = problem.settings.fine
-    window = max(fine.min_window, fine.window * noise.lateral)
-    return edge_terms(
-        view,
-        problem.image,
-        problem.settings.edges,
-        window,
-        noise.lateral,
-        noise.depth,
-        border * noise.lateral,
-        ALL,
-    )
+    lateral = noise.lateral * float(np.exp(np.clip(change, -MAX_NOISE_CHANGE, MAX_NOISE_CHANGE)))
+    return Noise(max(depth, min_noise.depth), min(max(lateral, min_noise.lateral), max_lateral))
 
 
 def _step(
@@ -137,7 +164,7 @@ def _step(
     planes: PlaneTerms,
     edges: EdgeTerms,
 ) -> tuple[NDArray[np.float64], float]:
-    """Return a damped step, and by how many pixels it moves the object."""
+    """Return a damped step (P,), and how far it moves the object's surface, pixels."""
     hessian = planes.hessian + edges.hessian
     gradient = planes.gradient + edges.gradient
     low, high = problem.limits.T

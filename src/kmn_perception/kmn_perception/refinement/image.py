@@ -9,10 +9,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.model.observation import Observation, all_free
+from kmn_perception.refinement.settings import OcclusionSettings
 
-THICKNESS = 0.004  # metres; other objects are at least as thick
-INTERPOLATED = 0.01  # metres by which interpolated depths may be wrong
 MIN_RANGE = 1e-6  # metres
+
+
+class Noise(NamedTuple):
+    """Standard deviations of a sensor: of the inverse depth (1 / m), and lateral (pixels)."""
+
+    depth: float
+    lateral: float
 
 
 class InverseDepthImage(NamedTuple):
@@ -22,21 +28,23 @@ class InverseDepthImage(NamedTuple):
     ----------
     inverse_depth
         (height, width) 1 / m where the object was seen. Elsewhere it is the negative of the inverse
-        depth up to which the pixel was seen to be empty: 0 for all of its line of sight, minus
-        infinity where nothing is known.
+        depth up to which the pixel's line of sight is free: 0 if all of it is, minus infinity if
+        nothing is known.
     interpolated
-        (height, width) nothing was measured there.
+        (height, width) whether nothing was measured there.
     pixels
-        (N, 3) u, v and inverse depth of all that was seen.
+        (N, 3) u, v and inverse depth of the pixels that show the object.
     projection
         (3, 4) map from the world to homogeneous pixels z (u, v, 1).
     upwards
         (4,) such that a point of depth z has the world height ``z * upwards[:3] . (u, v, 1) +
         upwards[3]``.
     floor
-        Height in metres up to which points were lost.
+        Height up to which points were removed with the support plane, metres.
     nearest, farthest
         Inverse depths between which the sensor measures, 1 / m.
+    occlusion
+        Where the object may be hidden behind something else.
     """
 
     inverse_depth: NDArray[np.float32]
@@ -47,9 +55,12 @@ class InverseDepthImage(NamedTuple):
     floor: float
     nearest: float
     farthest: float
+    occlusion: OcclusionSettings
 
 
-def inverse_depth_image(observation: Observation) -> InverseDepthImage:
+def inverse_depth_image(
+    observation: Observation, occlusion: OcclusionSettings
+) -> InverseDepthImage:
     """Return what the sensor saw of the object, and of the space around it."""
     camera = observation.camera
     matrix = camera.projection
@@ -70,23 +81,33 @@ def inverse_depth_image(observation: Observation) -> InverseDepthImage:
         float(observation.floor),
         1.0 / max(camera.near, MIN_RANGE),
         1.0 / camera.far,
+        occlusion,
     )
 
 
 @njit(cache=True, error_model="numpy")
-def may_hide(seen: float, interpolated: bool, inverse_depth: float) -> bool:
-    """Tell whether something may be at an inverse depth, though the pixel does not show it.
+def height_at(upwards: NDArray[np.float64], u: float, v: float, inverse_depth: float) -> float:
+    """Return the world height of what a pixel shows at an inverse depth, metres."""
+    up = upwards[0] * u + upwards[1] * v + upwards[2]
+    return float(up / inverse_depth + upwards[3])
 
-    It cannot be just behind what was measured, where the inside of another object is. What is
-    interpolated may be the surface of the very object, but not behind it.
+
+@njit(cache=True, error_model="numpy")
+def may_hide(
+    occlusion: OcclusionSettings, free: float, interpolated: bool, inverse_depth: float
+) -> bool:
+    """Return whether a pixel that does not show the object may hide it at an inverse depth.
+
+    It cannot hide it right behind a measured surface, which is that of an object of some thickness.
+    An interpolated surface may be that of the object itself.
 
     Parameters
     ----------
-    seen, interpolated
+    free, interpolated
         The pixel's values in `InverseDepthImage`; the former is not positive.
     """
-    margin = -INTERPOLATED if interpolated else THICKNESS
-    return seen < 0.0 and 1.0 / inverse_depth > -1.0 / seen + margin
+    margin = -occlusion.interpolation_error if interpolated else occlusion.min_thickness
+    return free < 0.0 and 1.0 / inverse_depth > -1.0 / free + margin
 
 
 @njit(cache=True)

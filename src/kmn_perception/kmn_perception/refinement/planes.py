@@ -1,4 +1,4 @@
-"""How far the observed depths lie from the model's faces."""
+"""The distances of the observed depths from the model's faces."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.correlation import correlated_count
-from kmn_perception.refinement.image import InverseDepthImage
-from kmn_perception.refinement.view import PLANES, ModelView, add_normal_equations, raycast_any
-
-LAGS = 8  # rows that may be shifted alike
+from kmn_perception.refinement.correlation import newey_west_variance
+from kmn_perception.refinement.image import InverseDepthImage, Noise
+from kmn_perception.refinement.solids import gradient, inverse_depth_at, raycast_any
+from kmn_perception.refinement.view import ModelView, add_normal_equations
 
 
 class PlaneTerms(NamedTuple):
@@ -32,55 +31,57 @@ class PlaneTerms(NamedTuple):
     residuals: NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
-def plane_terms(
-    view: ModelView,
-    image: InverseDepthImage,
-    stride: int,
-    noise: float,
-    lateral: float,
-    robust: float,
-    border: float,
-) -> PlaneTerms:
-    """Compare every ``stride``-th pixel with the face that its ray meets.
+class PlaneSampling(NamedTuple):
+    """Which pixels are compared with the faces, and how.
 
-    The prediction q . (u, v, 1) is linear in the plane, so that all pixels of a face are summed up
-    in one moment matrix. Where the steps of a sensor shift whole rows or columns of a face alike,
-    as the sums of their residuals show, they count only as often as they vary.
-
-    Parameters
+    Attributes
     ----------
-    noise, lateral
-        Standard deviations of the inverse depth (1 / m), and of where a pixel looks (pixels).
+    noise
+        Standard deviations of the inverse depth, and of where a pixel looks.
+    stride
+        Every such pixel is compared.
     robust
         Differences beyond this many standard deviations lose their weight (Geman and McClure).
     border
-        Pixels nearer than this to the rim of a face are left out: those that happened to look
+        Pixels closer than this to the border of a face are left out: those that happened to look
         beyond it show something else, or nothing, and the others would be biased.
+    correlated_rows
+        Number of neighbouring rows (or columns) whose errors may be correlated.
+    """
+
+    noise: Noise
+    stride: int
+    robust: float
+    border: float
+    correlated_rows: int
+
+
+@njit(cache=True, error_model="numpy")
+def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampling) -> PlaneTerms:
+    """Compare pixels with the faces that their rays meet.
+
+    The prediction q . (u, v, 1) is linear in the plane, so that all pixels of a face are summed up
+    in one moment matrix. Where the quantization of a sensor shifts whole rows or columns of a face
+    together, as the sums of their residuals show, the face loses weight accordingly.
     """
     pixels = image.pixels
     height, width = image.inverse_depth.shape
-    solids = view.solids
-    bodies, parameters = solids.shape[0], view.plane_slopes.shape[3]
-    rims = _rims(solids, border)
+    solids, robust = view.solids, sampling.robust
+    bodies, parameters = solids.shape[0], view.plane_jacobians.shape[3]
+    borders = _borders(solids, sampling.border)
+    deviations = _deviations(solids, sampling.noise)
     moments = np.zeros((bodies, 6, 3, 3))
     forces = np.zeros((bodies, 6, 3))
-    deviations = np.empty((bodies, 6))
-    for body in range(bodies):
-        for face in range(6):
-            k = PLANES + 3 * face
-            steepness = solids[body, k] ** 2 + solids[body, k + 1] ** 2
-            deviations[body, face] = math.sqrt(noise**2 + lateral**2 * steepness)
-    residuals = np.empty(pixels.shape[0] // stride + 1)
+    residuals = np.empty(pixels.shape[0] // sampling.stride + 1)
     row_sums, column_sums = np.zeros((bodies, 6, height)), np.zeros((bodies, 6, width))
     counts = np.zeros((bodies, 6), dtype=np.int64)
     count = 0
-    for i in range(0, pixels.shape[0], stride):
+    for i in range(0, pixels.shape[0], sampling.stride):
         u, v = float(pixels[i, 0]), float(pixels[i, 1])
         predicted, body, face = raycast_any(solids, u, v)
         if body < 0 or predicted > image.nearest or predicted < image.farthest:
             continue
-        if border > 0.0 and _at_rim(solids, rims, body, face, u, v, predicted):
+        if sampling.border > 0.0 and _at_border(solids, borders, body, face, u, v, predicted):
             continue
         residual = (pixels[i, 2] - predicted) / deviations[body, face]
         residuals[count] = residual
@@ -101,51 +102,62 @@ def plane_terms(
         forces[body, face, 0] -= residual * u
         forces[body, face, 1] -= residual * v
         forces[body, face, 2] -= residual
-    hessian, gradient = np.zeros((parameters, parameters)), np.zeros(parameters)
+    hessian, total = np.zeros((parameters, parameters)), np.zeros(parameters)
     for body in range(bodies):
         for face in range(6):
             if counts[body, face] == 0:
                 continue
             moment, force = moments[body, face], forces[body, face]
             moment[1, 0], moment[2, 0], moment[2, 1] = moment[0, 1], moment[0, 2], moment[1, 2]
-            in_rows, in_columns = (
-                correlated_count(row_sums[body, face], LAGS),
-                correlated_count(column_sums[body, face], LAGS),
-            )
-            often = max(1.0, in_rows / counts[body, face], in_columns / counts[body, face])
-            slopes = view.plane_slopes[body, face]
-            add_normal_equations(hessian, gradient, slopes, moment / often, force / often)
-    return PlaneTerms(hessian, gradient, residuals[:count])
+            rows = newey_west_variance(row_sums[body, face], sampling.correlated_rows)
+            columns = newey_west_variance(column_sums[body, face], sampling.correlated_rows)
+            inflation = max(1.0, rows / counts[body, face], columns / counts[body, face])
+            jacobian = view.plane_jacobians[body, face]
+            add_normal_equations(hessian, total, jacobian, moment / inflation, force / inflation)
+    return PlaneTerms(hessian, total, residuals[:count])
 
 
 @njit(cache=True, error_model="numpy")
-def _rims(solids: NDArray[np.float64], border: float) -> NDArray[np.float64]:
-    """Return (B, 6, 6) by how much two planes differ, ``border`` pixels from where they meet."""
-    rims = np.zeros((solids.shape[0], 6, 6))
+def _deviations(solids: NDArray[np.float64], noise: Noise) -> NDArray[np.float64]:
+    """Return the standard deviation (B, 6) of the inverse depth that is measured on each face."""
+    deviations = np.empty((solids.shape[0], 6))
     for body in range(solids.shape[0]):
         for face in range(6):
-            for other in range(6):
-                across = solids[body, PLANES + 3 * face : PLANES + 3 * face + 2]
-                across = across - solids[body, PLANES + 3 * other : PLANES + 3 * other + 2]
-                rims[body, face, other] = border * math.hypot(across[0], across[1])
-    return rims
+            by_u, by_v = gradient(solids, body, face)
+            deviations[body, face] = math.sqrt(
+                noise.depth**2 + noise.lateral**2 * (by_u**2 + by_v**2)
+            )
+    return deviations
 
 
 @njit(cache=True, error_model="numpy")
-def _at_rim(
+def _borders(solids: NDArray[np.float64], border: float) -> NDArray[np.float64]:
+    """Return the difference (B, 6, 6) between two planes ``border`` pixels from where they meet."""
+    borders = np.zeros((solids.shape[0], 6, 6))
+    for body in range(solids.shape[0]):
+        for face in range(6):
+            by_u, by_v = gradient(solids, body, face)
+            for other in range(6):
+                other_by_u, other_by_v = gradient(solids, body, other)
+                steepness = math.hypot(by_u - other_by_u, by_v - other_by_v)
+                borders[body, face, other] = border * steepness
+    return borders
+
+
+@njit(cache=True, error_model="numpy")
+def _at_border(
     solids: NDArray[np.float64],
-    rims: NDArray[np.float64],
+    borders: NDArray[np.float64],
     body: int,
     face: int,
     u: float,
     v: float,
     inverse_depth: float,
 ) -> bool:
-    """Tell whether a pixel lies near the rim of the face that it shows."""
+    """Return whether a pixel lies near the border of the face that it shows."""
     for other in range(6):
         if other != face:
-            k = PLANES + 3 * other
-            beyond = solids[body, k] * u + solids[body, k + 1] * v + solids[body, k + 2]
-            if abs(inverse_depth - beyond) < rims[body, face, other]:
+            beyond = inverse_depth_at(solids, body, other, u, v)
+            if abs(inverse_depth - beyond) < borders[body, face, other]:
                 return True
     return False

@@ -16,7 +16,6 @@ from kmn_perception.refinement.misfit import misfit
 from kmn_perception.refinement.settings import RefinementSettings
 from kmn_perception.refinement.view import ModelView, model_view
 
-SOME = 1000  # pixels that tell the object's distance
 MIN_MOVEMENT = 1e-12  # pixels per unit
 
 
@@ -34,7 +33,8 @@ class Problem:
         cls, model: KinematicModel, observation: Observation, settings: RefinementSettings
     ) -> Problem:
         """Return the problem of fitting a model to an observation."""
-        return cls(shape_of(model), model.limits, inverse_depth_image(observation), settings)
+        image = inverse_depth_image(observation, settings.occlusion)
+        return cls(shape_of(model), model.limits, image, settings)
 
     @cached_property
     def half_range(self) -> NDArray[np.float64]:
@@ -42,12 +42,13 @@ class Problem:
         return 0.5 * (self.limits[:, 1] - self.limits[:, 0])
 
     @cached_property
-    def steepness(self) -> float:
-        """Inverse depth per metre at the object's distance, 1 / m^2."""
-        return float(np.mean(self.image.pixels[:: self.stride(SOME), 2])) ** 2
+    def inverse_depth_per_metre(self) -> float:
+        """Change of the inverse depth per metre at the object's distance, 1 / m^2."""
+        stride = self.stride(self.settings.distance_pixels)
+        return float(np.mean(self.image.pixels[::stride, 2])) ** 2
 
     def stride(self, pixels: int) -> int:
-        """Return which of the observed pixels to take, so that there are about so many."""
+        """Return the stride that leaves about this many of the observed pixels."""
         return max(1, round(len(self.image.pixels) / pixels))
 
     def view(self, values: NDArray[np.float64]) -> ModelView:
@@ -55,26 +56,28 @@ class Problem:
         return model_view(self.shape, values, self.image.projection)
 
     def misfit(self, values: NDArray[np.float64]) -> float:
-        """Return the share of pixels that the model explains wrongly, from some of them."""
+        """Return the fraction of pixels that the model explains wrongly, from some of them."""
         settings = self.settings.misfit
-        return misfit(self.view(values), self.image, settings.pixels, settings.depth)
+        return misfit(self.view(values), self.image, settings, settings.pixels)
 
     def final_misfit(self, values: NDArray[np.float64]) -> float:
-        """Return the share of pixels that the model explains wrongly, from many of them."""
+        """Return the fraction of pixels that the model explains wrongly, from many of them."""
         settings = self.settings.misfit
-        return misfit(self.view(values), self.image, settings.final_pixels, settings.depth)
+        return misfit(self.view(values), self.image, settings, settings.final_pixels)
 
-    def kept(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values kept within the limits, and a margin beside them."""
+    def clipped(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values (P,), clipped to the limits and a margin beside them."""
         margin = 2.0 * self.settings.limit_margin * self.half_range
-        return np.minimum(
-            np.maximum(values, self.limits[:, 0] - margin), self.limits[:, 1] + margin
-        )
+        low, high = self.limits.T
+        return np.minimum(np.maximum(values, low - margin), high + margin)
 
     def pixels_per_unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return by about how many pixels each parameter (P,) moves the object's surface."""
-        _, slopes = cuboids(self.shape, values)
-        squares = slopes**2
+        """Return approximately how far each parameter (P,) moves the surface in the image."""
+        _, jacobians = cuboids(self.shape, values)
+        squares = jacobians**2
         corners = 0.25 * squares[:, :, :3].sum(axis=(1, 2)) + squares[:, :, 3].sum(axis=1)
         focal_length = np.linalg.norm(self.image.projection[0, :3])
-        return np.sqrt(corners.max(axis=0) * self.steepness) * focal_length + MIN_MOVEMENT
+        return (
+            np.sqrt(corners.max(axis=0) * self.inverse_depth_per_metre) * focal_length
+            + MIN_MOVEMENT
+        )

@@ -16,10 +16,8 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
-from kmn_perception.refinement.edges import MAX_WINDOW
-from kmn_perception.refinement.silhouette import EdgeSettings
 
-Window = Annotated[float, Field(ge=1.0, le=MAX_WINDOW)]
+Window = Annotated[float, Field(ge=1.0, le=64.0)]
 Pixels = Annotated[int, Field(ge=100)]
 
 
@@ -30,13 +28,13 @@ class SearchSettings:
     Attributes
     ----------
     window
-        Pixels to either side in which an edge is sought.
+        Distance to either side within which an edge is sought, pixels.
     depth
         Larger differences in depth are ignored, metres.
     steps
-        Of Gauss-Newton.
+        Number of Gauss-Newton steps.
     samples
-        Of each edge.
+        Maximum number of samples of each edge.
     """
 
     window: Window
@@ -46,40 +44,56 @@ class SearchSettings:
 
 
 class ReacquisitionSettings(NamedTuple):
-    """The search for a lost body: size of the grid, and the support that is enough without it."""
+    """The search for a small body that the coarse search has lost.
 
-    tries: Count
-    enough: Annotated[float, Field(ge=-1.0, le=1.0)]
+    Attributes
+    ----------
+    candidates
+        Approximate number of places on the grid that is searched.
+    min_support
+        A body with at least this support is in its place.
+    """
+
+    candidates: Count
+    min_support: Annotated[float, Field(ge=-1.0, le=1.0)]
 
 
 @dataclass(frozen=True)
 class FineSettings:
-    """The fit to the noise of the sensor.
+    """The fit down to the noise of the sensor.
 
     Attributes
     ----------
     steps
-        Largest number of steps with few, and again with many pixels.
+        Maximum number of steps, first with few and then with many pixels.
     depth_pixels
         Number of observed pixels whose depth is compared in the last steps.
     noise, min_noise
-        Lateral noise at the start and at least, pixels.
+        Lateral noise at the start, which is also its maximum, and its minimum, pixels.
     window, min_window
-        Pixels that count beside an edge, in units of the lateral noise, and at least.
+        Distance to an edge within which pixels count, in units of the lateral noise, and its
+        minimum in pixels.
     min_depth_noise
         Metres.
     robust
-        Depths beyond this lose their weight, in units of their noise.
+        Differences in depth beyond this lose their weight, in units of their noise.
     border
-        Pixels nearer than this to the rim of a face or image are left out, in units of the lateral
-        noise.
+        Pixels closer than this to the border of a face or of an edge are left out, in units of the
+        lateral noise.
     tolerance
-        A smaller step is the last, in units of the lateral noise (but at least of 0.1 pixels).
+        The fit has converged when a step is smaller than this, in units of the lateral noise.
+    min_tolerance_noise
+        Lateral noise below this counts as this much for the tolerance, pixels.
+    noise_tolerance
+        The noise has converged when it changes by less than this fraction.
+    shorten_after
+        After each such number of steps they are shortened, to a half, a third and so on, so that
+        they do not oscillate.
     """
 
     steps: Annotated[int, Field(ge=1, le=1000)]
     depth_pixels: Pixels
-    noise: Annotated[float, Field(gt=0.0, le=MAX_WINDOW / 4)]
+    noise: Annotated[float, Field(gt=0.0, le=16.0)]
     min_noise: Annotated[float, Field(gt=0.0, le=1.0)]
     window: Annotated[float, Field(ge=1.0, le=10.0)]
     min_window: Window
@@ -87,69 +101,183 @@ class FineSettings:
     robust: Annotated[float, Field(ge=1.0)]
     border: Annotated[float, Field(ge=0.0, le=10.0)]
     tolerance: Fraction
+    min_tolerance_noise: NonNegative
+    noise_tolerance: Positive
+    shorten_after: Count
 
 
-@dataclass(frozen=True)
-class MisfitSettings:
-    """The common measure of a fit.
+class EdgeSettings(NamedTuple):
+    """What distinguishes a body from what lies in front of it and behind it, at its silhouette.
+
+    Attributes
+    ----------
+    occluder
+        What lies at least this far in front of the edge belongs to something else, metres.
+    background
+        So does what lies at least this far behind it where the model has nothing, metres.
+    contrast
+        Minimum step in depth between two bodies that can be told apart, metres.
+    distinct
+        Number of standard deviations by which two depths differ for certain.
+    floor_margin
+        Edges less than this above the floor are not used, metres.
+    outliers
+        Fraction of pixels that may show anything.
+    interpolated
+        Fraction of the probability that remains where the depth is interpolated.
+    stepless_weight
+        Weight, in the coarse search, of a sample in which no depth step was found.
+    min_visible
+        An edge is in view when at least this fraction of its samples has a depth step.
+    subpixel_phases
+        The rounding to pixels averages out along an edge that shifts by more than 1 /
+        ``subpixel_phases`` of a pixel from its first sample to its last.
+    correlated_samples
+        Number of neighbouring samples of an edge whose errors may be correlated.
+    """
+
+    occluder: NonNegative
+    background: NonNegative
+    contrast: NonNegative
+    distinct: NonNegative
+    floor_margin: NonNegative
+    outliers: Annotated[float, Field(gt=0.0, lt=0.5)]
+    interpolated: Fraction
+    stepless_weight: Fraction
+    min_visible: Fraction
+    subpixel_phases: NonNegative
+    correlated_samples: Count
+
+
+class OcclusionSettings(NamedTuple):
+    """Where the object may be hidden behind something else.
+
+    Attributes
+    ----------
+    min_thickness
+        Other objects are at least this thick, metres.
+    interpolation_error
+        Maximum error of interpolated depths, metres.
+    """
+
+    min_thickness: NonNegative
+    interpolation_error: NonNegative
+
+
+class MisfitSettings(NamedTuple):
+    """The common measure of how badly values explain an observation.
 
     Attributes
     ----------
     pixels, final_pixels
-        About this many of the observed pixels are looked at, during the search and in the end.
+        Approximate number of observed pixels that are compared, during the search and at the end.
+    max_area
+        Maximum number of pixels compared in all, as a multiple of those.
     depth
         A difference in depth (metres) that counts as much as a pixel on the wrong side.
-    bad, wrong
-        Above these shares other starts are tried, and the result is not to be trusted.
+    digits
+        Decimals to which the misfit is rounded, so that rounding of the points does not decide.
+    retry_above
+        Above this misfit, other starts are tried.
+    reject_above
+        Above this misfit, the result is not to be trusted.
     """
 
     pixels: Pixels
     final_pixels: Pixels
+    max_area: Count
     depth: Annotated[float, Field(gt=0.0, le=10.0)]
-    bad: NonNegative
-    wrong: NonNegative
+    digits: Annotated[int, Field(ge=1, le=15)]
+    retry_above: NonNegative
+    reject_above: NonNegative
+
+
+@dataclass(frozen=True)
+class StartSettings:
+    """Other starts than the estimate.
+
+    Attributes
+    ----------
+    yaws
+        Number of yaws, evenly spread over the range, that are compared where there is no estimate.
+    fitted
+        Number of the best of these from which the model is fitted.
+    scanned
+        Number of values of each parameter, evenly spread over its range, that are tried after a bad
+        fit.
+    """
+
+    yaws: Annotated[int, Field(ge=1, le=100)]
+    fitted: Annotated[int, Field(ge=1, le=100)]
+    scanned: Annotated[int, Field(ge=1, le=100)]
+
+
+@dataclass(frozen=True)
+class UnobservableSettings:
+    """Directions in the space of the parameters that the view does not show.
+
+    Attributes
+    ----------
+    deviation
+        A direction is unobservable when its standard deviation exceeds this fraction of half the
+        range.
+    loss_rise
+        Values along it are possible until the negative log-likelihood has risen by this.
+    points
+        Number of points at which the likelihood along it is integrated.
+    passes
+        Number of times that several unobservable directions are gone through.
+    """
+
+    deviation: Fraction
+    loss_rise: NonNegative
+    points: Count
+    passes: Count
 
 
 @dataclass(frozen=True)
 class RefinementSettings:
-    """All numbers of the refinement.
+    """All settings of the refinement.
 
     Attributes
     ----------
     min_points
-        Fewer points are not refined.
+        Observations of fewer points are not refined.
     depth_pixels
-        Number of observed pixels whose depth is compared in one step.
-    search, reacquire, fine, edges, misfit
-        Of the parts.
-    starts
-        From so many starts the model is fitted where there is no estimate.
+        Approximate number of observed pixels whose depth is compared in one step.
+    distance_pixels
+        Approximate number of observed pixels from which the object's distance is taken.
+    correlated_rows
+        Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
+    search, reacquisition, fine, edges, occlusion, misfit, starts, unobservable
+        Settings of the parts.
     damping
-        Information that every squared pixel of movement is taken to cost.
+        Information that damps the steps, per squared pixel of movement.
     limit_margin
-        By how much of its range a parameter may lie beyond its limits.
+        How far a parameter may lie beyond its limits, as a fraction of its range.
     limit_softness
-        Standard deviation beyond the limits, as a share of half the range.
-    unobservable
-        A direction is unobservable when its standard deviation exceeds this share of half the
-        range.
-    segment_rise
-        It ends where the negative log-likelihood has risen by this.
+        Standard deviation of a parameter beyond its limits, as a fraction of half its range.
+    agreement
+        A start that differs from the fit by no more than this many standard deviations (and pixels)
+        agrees with it.
     """
 
     min_points: Count
     depth_pixels: Pixels
-    search: tuple[SearchSettings, ...]
-    reacquire: ReacquisitionSettings
+    distance_pixels: Pixels
+    correlated_rows: Count
+    search: Annotated[tuple[SearchSettings, ...], Field(min_length=1)]
+    reacquisition: ReacquisitionSettings
     fine: FineSettings
     edges: EdgeSettings
-    starts: Annotated[int, Field(ge=1, le=100)]
+    occlusion: OcclusionSettings
+    misfit: MisfitSettings
+    starts: StartSettings
+    unobservable: UnobservableSettings
     damping: NonNegative
     limit_margin: NonNegative
     limit_softness: Annotated[float, Field(gt=0.0, le=1.0)]
-    misfit: MisfitSettings
-    unobservable: Fraction
-    segment_rise: NonNegative
+    agreement: NonNegative
 
     @classmethod
     def load(cls, path: Path | None = None) -> RefinementSettings:

@@ -3,147 +3,174 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import Field
 
-from kmn_perception.configuration.settings import Fraction, NonNegative
-from kmn_perception.refinement.image import may_hide
-from kmn_perception.refinement.view import raycast
+from kmn_perception.refinement.image import InverseDepthImage, may_hide
+from kmn_perception.refinement.settings import EdgeSettings
+from kmn_perception.refinement.solids import inverse_depth_at, raycast, raycast_others
 
-CERTAIN = 5.0  # standard deviations that tell two depths apart
-MOST = 100.0  # of a log-likelihood ratio
+MIN_SLOPE = 1e-9  # of an edge that crosses a row at all
+MAX_LOG_RATIO = 100.0  # of likelihoods; nothing is more certain
 
 
-class EdgeSettings(NamedTuple):
-    """What tells a body from what lies before and behind it.
+class Crossing(NamedTuple):
+    """Where an edge crosses a row of pixels, or a column.
 
     Attributes
     ----------
-    occluder
-        What lies this much before the edge belongs to something else, metres.
-    background
-        So does what lies this much behind it where the model has nothing, metres.
-    contrast
-        Least step in depth that tells two bodies apart, metres.
-    floor_margin
-        Edges less than this above the floor are not used, metres.
-    outliers
-        Share of pixels that show anything.
-    interpolated
-        Of the probability, where nothing was measured.
+    horizontal
+        Whether it crosses a row rather than a column.
+    number
+        Of the row (or column).
+    position
+        Column (or row) of the crossing.
+    slope
+        Change of the distance to the edge from one pixel of the row (or column) to the next.
+    inverse_depth
+        Of the edge at the crossing, 1 / m.
     """
 
-    occluder: NonNegative
-    background: NonNegative
-    contrast: NonNegative
-    floor_margin: NonNegative
-    outliers: Annotated[float, Field(gt=0.0, lt=0.5)]
-    interpolated: Fraction
+    horizontal: bool
+    number: int
+    position: float
+    slope: float
+    inverse_depth: float
+
+
+class Strip(NamedTuple):
+    """The pixels of a row (or column) around an edge, from outside to inside.
+
+    Attributes
+    ----------
+    start, step
+        The outermost pixel, and the step inwards (1 or -1).
+    evidence
+        (K,) positive where a pixel shows the body, negative where it shows something behind it, 0
+        where neither is known. Its absolute value is the probability that this is right.
+    """
+
+    start: int
+    step: int
+    evidence: NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
-def scan(
+def crossing_of(
     solids: NDArray[np.float64],
-    inverse_depth: NDArray[np.float32],
-    interpolated: NDArray[np.bool_],
-    settings: EdgeSettings,
-    depth_noise: float,
-    b: int,
-    slope: float,
-    at_edge: float,
-    rows: bool,
-    a: int,
-    position: float,
-    window: float,
-    chord: float,
-    evidence: NDArray[np.float64],
-) -> tuple[int, int, int]:
-    """Classify the pixels of row (or column) ``a`` around an edge, from outside to inside.
+    body: int,
+    face: int,
+    line: NDArray[np.float64],
+    number: int,
+) -> Crossing:
+    """Return where the edge of a face crosses a row, or a column if the edge is rather horizontal.
 
     Parameters
     ----------
-    slope
-        Change of the distance to the edge from pixel to pixel.
-    at_edge, position
-        Inverse depth of the edge, and where it crosses the row.
-    window, chord
-        How far to look to either side, and how far inside at most, in pixels.
-    evidence
-        Is filled in: positive where the body is seen, negative where something behind it is, 0
-        where neither is known. Its amount is the probability that this is right.
-
-    Returns
-    -------
-    start, step, count
-        The outermost pixel, the step inwards (1 or -1) and the number of pixels.
+    line
+        (3,) of the edge, see `ModelView`.
     """
-    step = 1 if slope > 0.0 else -1
-    reach = window / abs(slope)
-    inwards = min(reach, chord)
-    last = (inverse_depth.shape[1] if rows else inverse_depth.shape[0]) - 1
+    horizontal = abs(line[0]) >= abs(line[1])
+    along, across = (line[1], line[0]) if horizontal else (line[0], line[1])
+    position = -(along * number + line[2]) / across
+    u, v = (position, float(number)) if horizontal else (float(number), position)
+    return Crossing(
+        horizontal, number, position, across, inverse_depth_at(solids, body, face, u, v)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def pixel(crossing: Crossing, position: float) -> tuple[float, float]:
+    """Return u and v of a position in the row (or column) of a crossing."""
+    if crossing.horizontal:
+        return position, float(crossing.number)
+    return float(crossing.number), position
+
+
+@njit(cache=True, error_model="numpy")
+def strip_around(
+    solids: NDArray[np.float64],
+    image: InverseDepthImage,
+    settings: EdgeSettings,
+    depth_noise: float,
+    body: int,
+    crossing: Crossing,
+    reach: tuple[float, float],
+    buffer: NDArray[np.float64],
+) -> Strip:
+    """Classify the pixels around the crossing of a body's edge.
+
+    Parameters
+    ----------
+    depth_noise
+        Standard deviation of the inverse depth, 1 / m.
+    reach
+        How far to look outwards and inwards, pixels.
+    buffer
+        Memory for the evidence.
+    """
+    inverse_depth, interpolated = image.inverse_depth, image.interpolated
+    position, horizontal, number = crossing.position, crossing.horizontal, crossing.number
+    outwards, inwards = reach
+    step = 1 if crossing.slope > 0.0 else -1
+    last = (inverse_depth.shape[1] if horizontal else inverse_depth.shape[0]) - 1
     if step > 0:
-        start = max(math.ceil(position - reach), 0)
+        start = max(math.ceil(position - outwards), 0)
         stop = min(math.floor(position + inwards), last)
     else:
-        start = min(math.floor(position + reach), last)
+        start = min(math.floor(position + outwards), last)
         stop = max(math.ceil(position - inwards), 0)
     count = max((stop - start) * step + 1, 0)
     for k in range(count):
         p = start + step * k
-        column, row = (p, a) if rows else (a, p)
-        expected, _ = raycast(solids, b, float(column), float(row))
+        column, row = (p, number) if horizontal else (number, p)
+        expected, _ = raycast(solids, body, float(column), float(row))
         if expected == 0.0:
-            expected = at_edge
+            expected = crossing.inverse_depth
         seen = float(inverse_depth[row, column])
-        if seen <= 0.0 and may_hide(seen, interpolated[row, column], expected):
-            evidence[k] = 0.0
+        if seen <= 0.0 and may_hide(image.occlusion, seen, interpolated[row, column], expected):
+            buffer[k] = 0.0
             continue
-        evidence[k] = _evidence(
-            solids, settings, depth_noise, b, float(column), float(row), seen, expected
-        )
+        behind = raycast_others(solids, body, float(column), float(row))
+        buffer[k] = _evidence(settings, depth_noise, seen, expected, behind)
         if interpolated[row, column]:
-            evidence[k] *= settings.interpolated
-    return start, step, count
+            buffer[k] *= settings.interpolated
+    return Strip(start, step, buffer[:count])
 
 
 @njit(cache=True, error_model="numpy")
 def _evidence(
-    solids: NDArray[np.float64],
-    settings: EdgeSettings,
-    depth_noise: float,
-    b: int,
-    u: float,
-    v: float,
-    seen: float,
-    expected: float,
+    settings: EdgeSettings, depth_noise: float, seen: float, expected: float, behind: float
 ) -> float:
-    """Tell whether a pixel shows the body, at the inverse depth expected, or what is behind it."""
+    """Return the evidence that a pixel shows the body rather than what is behind it, see `Strip`.
+
+    Parameters
+    ----------
+    seen, expected, behind
+        Inverse depths: of the pixel, of the body there, and of the model's other bodies (0 if there
+        are none).
+    """
+    if behind > expected:
+        return 0.0
     certain = 1.0 - settings.outliers
-    behind = 0.0
-    for other in range(solids.shape[0]):
-        if other != b:
-            met, _ = raycast(solids, other, u, v)
-            if met > expected:
-                return 0.0
-            behind = max(behind, met)
     if seen <= 0.0:
         return -certain
     depth = 1.0 / seen - 1.0 / expected
-    if depth < -settings.occluder and seen > expected + CERTAIN * depth_noise:
+    margin = settings.distinct * depth_noise
+    if depth < -settings.occluder and seen > expected + margin:
         return 0.0
     if behind == 0.0:
-        beyond = depth > settings.background and seen < expected - CERTAIN * depth_noise
+        beyond = depth > settings.background and seen < expected - margin
         return -certain if beyond else certain
     if 1.0 / behind - 1.0 / expected < settings.contrast:
         return 0.0
     middle, gap = 0.5 * (expected + behind), expected - behind
-    ratio = math.exp(-min(abs(seen - middle) * gap / depth_noise**2, MOST))
-    sure = min(1.0 / (1.0 + ratio), certain)
-    return sure if seen > middle else -sure
+    ratio = math.exp(-min(abs(seen - middle) * gap / depth_noise**2, MAX_LOG_RATIO))
+    probability = min(1.0 / (1.0 + ratio), certain)
+    return probability if seen > middle else -probability
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,41 +179,40 @@ def half_chord(
     ends: NDArray[np.float64],
     faces: NDArray[np.int64],
     edge: int,
-    rows: bool,
-    a: int,
-    position: float,
+    crossing: Crossing,
 ) -> float:
-    """Return half the way along a row (or column) to the other side of a body's silhouette."""
-    along = 1 if rows else 0
-    step = 1.0 if lines[edge, 1 - along] > 0.0 else -1.0
+    """Return half the distance along a row (or column) to the other side of a body's silhouette."""
+    along = 1 if crossing.horizontal else 0
+    step = 1.0 if crossing.slope > 0.0 else -1.0
     nearest = np.inf
     for other in range(12):
         if other == edge or faces[other] < 0:
             continue
         low, high = ends[other, along], ends[other, 2 + along]
         slope = lines[other, 1 - along]
-        if min(low, high) <= a <= max(low, high) and abs(slope) > 1e-9:
-            at = -(lines[other, along] * a + lines[other, 2]) / slope
-            if (at - position) * step > 0.0:
-                nearest = min(nearest, (at - position) * step)
+        if min(low, high) <= crossing.number <= max(low, high) and abs(slope) > MIN_SLOPE:
+            position = -(lines[other, along] * crossing.number + lines[other, 2]) / slope
+            distance = (position - crossing.position) * step
+            if distance > 0.0:
+                nearest = min(nearest, distance)
     return 0.5 * nearest
 
 
 @njit(cache=True, error_model="numpy")
 def split(evidence: NDArray[np.float64]) -> tuple[int, int]:
-    """Return how many pixels, from outside, to put behind so that the fewest are wrong.
+    """Return how many pixels, from outside, show what is behind so that the fewest are wrong.
 
-    The least and the largest number differ where nothing is known of the pixels between them.
+    The minimum and the maximum number differ where nothing is known of the pixels between them.
     """
     cost = 0
     for k in range(evidence.shape[0]):
         if evidence[k] < 0.0:
             cost += 1
-    cheapest, first, last = cost, 0, 0
+    min_cost, first, last = cost, 0, 0
     for k in range(evidence.shape[0]):
         cost += int(np.sign(evidence[k]))
-        if cost < cheapest:
-            cheapest, first, last = cost, k + 1, k + 1
-        elif cost == cheapest and last == k and evidence[k] == 0.0:
+        if cost < min_cost:
+            min_cost, first, last = cost, k + 1, k + 1
+        elif cost == min_cost and last == k and evidence[k] == 0.0:
             last = k + 1
     return first, last

@@ -1,8 +1,8 @@
-"""The model as a camera sees it: its faces and silhouette, and how they move.
+"""The model as a camera sees it: its faces and silhouette, and their derivatives.
 
-All that is seen is written in homogeneous pixels P = z (u, v, 1), which the camera matrix K makes
-of the optical frame. A plane is a vector q with q . P = 1, so that its inverse depth at a pixel is
-q . (u, v, 1), and the image of a straight edge is a line l with l . (u, v, 1) = 0.
+All that is seen is written in homogeneous pixels P = z (u, v, 1), to which the camera matrix K maps
+the optical frame. A plane is a vector q with q . P = 1, so that its inverse depth at a pixel is
+q . (u, v, 1). The image of a straight edge is a line l with l . (u, v, 1) = 0.
 """
 
 from __future__ import annotations
@@ -14,111 +14,137 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import Shape, cuboids
+from kmn_perception.refinement.solids import (
+    BOTTOM,
+    FACES_CAMERA,
+    LEFT,
+    PLANES,
+    RIGHT,
+    SOLID,
+    TOP,
+    faces_camera,
+)
 
-MIN_DEPTH = 1e-3  # metres in front of the camera; edges are cut off there
-PLANES, VISIBLE, SOLID = 4, 22, 28  # where the planes and flags of a solid begin, and its length
+MIN_DEPTH = 1e-3  # metres in front of the camera; edges are clipped there
+MIN_OFFSET = 1e-9  # of the camera from a face's plane, in sizes of the body
 
 
 class ModelView(NamedTuple):
     """The model as a camera sees it; P parameters, faces and edges numbered within each body.
 
     Face ``2 * axis`` is at -1/2 along the unit cube's axis, ``2 * axis + 1`` at +1/2.
+
+    Attributes
+    ----------
+    solids
+        (B, SOLID) the bodies for raycasts, see `solids`.
+    plane_jacobians
+        (B, 6, 3, P) derivatives of the planes q.
+    lines
+        (B, 12, 3) l of the silhouette's edges: l . (u, v, 1) is the distance of a pixel to the
+        edge, in pixels, positive inside.
+    line_jacobians
+        (B, 12, 3, P) derivatives of the lines.
+    ends
+        (B, 12, 4) u and v of both ends of each edge.
+    faces
+        (B, 12) the face beside each edge of the silhouette that the camera sees; -1 at edges that
+        do not belong to the silhouette.
     """
 
-    solids: NDArray[np.float64]  # (B, SOLID) for ``raycast``: the bounds, then q of the faces, then
-    # 1 for each face that looks at the camera
-    plane_slopes: NDArray[np.float64]  # (B, 6, 3, P)
-    lines: NDArray[np.float64]  # (B, 12, 3) l: distance to the edge in pixels, positive inside
-    line_slopes: NDArray[np.float64]  # (B, 12, 3, P)
-    ends: NDArray[np.float64]  # (B, 12, 4) u, v of both ends
-    faces: NDArray[np.int64]  # (B, 12) the visible face at a silhouette edge, -1 at other edges
+    solids: NDArray[np.float64]
+    plane_jacobians: NDArray[np.float64]
+    lines: NDArray[np.float64]
+    line_jacobians: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    faces: NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy")
 def model_view(
-    shape: Shape, values: NDArray[np.float64], projected: NDArray[np.float64]
+    shape: Shape, values: NDArray[np.float64], projection: NDArray[np.float64]
 ) -> ModelView:
-    """Return the model at ``values`` as a camera of matrix ``projected`` (3, 4) sees it."""
-    cubes, cube_slopes = cuboids(shape, values)
-    bodies, count = cubes.shape[0], values.shape[0]
+    """Return the model at ``values`` (P,) as a camera with a projection (3, 4) sees it."""
+    cubes, cube_jacobians = cuboids(shape, values)
+    bodies, parameters = cubes.shape[0], values.shape[0]
     view = ModelView(
         np.zeros((bodies, SOLID)),
-        np.zeros((bodies, 6, 3, count)),
+        np.zeros((bodies, 6, 3, parameters)),
         np.zeros((bodies, 12, 3)),
-        np.zeros((bodies, 12, 3, count)),
+        np.zeros((bodies, 12, 3, parameters)),
         np.zeros((bodies, 12, 4)),
         np.full((bodies, 12), -1),
     )
-    for b in range(bodies):
-        cube, slopes = np.zeros((3, 4)), np.zeros((3, 4, count))
-        cube[:, 3] = projected[:, 3]
+    for body in range(bodies):
+        cube, jacobian = np.zeros((3, 4)), np.zeros((3, 4, parameters))
+        cube[:, 3] = projection[:, 3]
         for row in range(3):
             for k in range(3):
-                cube[row] += projected[row, k] * cubes[b, k]
-                slopes[row] += projected[row, k] * cube_slopes[b, k]
-        _see_faces(view, b, cube, slopes)
-        _see_edges(view, b, cube, slopes)
-        _bound(view.solids[b], cube)
+                cube[row] += projection[row, k] * cubes[body, k]
+                jacobian[row] += projection[row, k] * cube_jacobians[body, k]
+        _see_faces(view, body, cube, jacobian)
+        _see_edges(view, body, cube, jacobian)
+        _bound(view.solids[body], cube)
     return view
 
 
 @njit(cache=True, error_model="numpy")
 def _see_faces(
-    view: ModelView, b: int, cube: NDArray[np.float64], slopes: NDArray[np.float64]
+    view: ModelView, body: int, cube: NDArray[np.float64], jacobian: NDArray[np.float64]
 ) -> None:
-    """Fill in the planes of the body's faces, and which of them look at the camera."""
+    """Fill in the planes of the body's faces, and which of them face the camera."""
     inverse = np.empty((3, 3))
     for axis in range(3):
-        across = np.cross(cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3])
-        inverse[axis] = across / (across * cube[:, axis]).sum()
+        normal = np.cross(cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3])
+        inverse[axis] = normal / (normal * cube[:, axis]).sum()
     for axis in range(3):
         row = inverse[axis]
         for side in range(2):
             offset = side - 0.5 + (row * cube[:, 3]).sum()
             face = 2 * axis + side
-            view.solids[b, VISIBLE + face] = 1.0 if (2 * side - 1) * offset < 0.0 else 0.0
-            if abs(offset) < 1e-9:
-                offset = 1e-9  # seen exactly from the side
-            view.solids[b, PLANES + 3 * face : PLANES + 3 * face + 3] = row / offset
-            for i in range(slopes.shape[2]):
-                row_slope = np.zeros(3)
-                offset_slope = 0.0
+            view.solids[body, FACES_CAMERA + face] = 1.0 if (2 * side - 1) * offset < 0.0 else 0.0
+            if abs(offset) < MIN_OFFSET:
+                offset = MIN_OFFSET
+            view.solids[body, PLANES + 3 * face : PLANES + 3 * face + 3] = row / offset
+            for i in range(jacobian.shape[2]):
+                row_derivative = np.zeros(3)
+                offset_derivative = 0.0
                 for k in range(3):
-                    offset_slope += row[k] * slopes[k, 3, i]
+                    offset_derivative += row[k] * jacobian[k, 3, i]
                     for j in range(3):
-                        product = row[k] * slopes[k, j, i]
+                        product = row[k] * jacobian[k, j, i]
                         for c in range(3):
-                            row_slope[c] -= product * inverse[j, c]
+                            row_derivative[c] -= product * inverse[j, c]
                 for c in range(3):
-                    offset_slope += row_slope[c] * cube[c, 3]
+                    offset_derivative += row_derivative[c] * cube[c, 3]
                 for c in range(3):
-                    view.plane_slopes[b, face, c, i] = (
-                        row_slope[c] - row[c] * offset_slope / offset
+                    view.plane_jacobians[body, face, c, i] = (
+                        row_derivative[c] - row[c] * offset_derivative / offset
                     ) / offset
 
 
 @njit(cache=True, error_model="numpy")
 def _see_edges(
     view: ModelView,
-    b: int,
+    body: int,
     cube: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
 ) -> None:
     """Fill in the body's silhouette: edges between a face that is seen and one that is not."""
     for edge in range(12):
         axis, first, second = edge // 4, (edge // 4 + 1) % 3, (edge // 4 + 2) % 3
         low, high = (edge // 2) % 2, edge % 2
         face, hidden = 2 * first + low, 2 * second + high
-        if view.solids[b, VISIBLE + face] == view.solids[b, VISIBLE + hidden]:
+        if faces_camera(view.solids, body, face) == faces_camera(view.solids, body, hidden):
             continue
-        if view.solids[b, VISIBLE + hidden] > 0.0:
+        if faces_camera(view.solids, body, hidden):
             face = hidden
         start = cube[:, 3] + (low - 0.5) * cube[:, first] + (high - 0.5) * cube[:, second]
-        start_slope = (
-            slopes[:, 3] + (low - 0.5) * slopes[:, first] + (high - 0.5) * slopes[:, second]
+        start_jacobian = (
+            jacobian[:, 3] + (low - 0.5) * jacobian[:, first] + (high - 0.5) * jacobian[:, second]
         )
-        direction, direction_slope = cube[:, axis], slopes[:, axis]
-        if not _ends(view.ends[b, edge], start, direction):
+        direction, direction_jacobian = cube[:, axis], jacobian[:, axis]
+        if not _ends(view.ends[body, edge], start, direction):
             continue
         line = np.cross(start, direction)
         length = np.hypot(line[0], line[1])
@@ -126,27 +152,32 @@ def _see_edges(
         if (line * inside).sum() < 0.0:
             length = -length
         line /= length
-        view.lines[b, edge] = line
-        view.faces[b, edge] = face
-        for i in range(slopes.shape[2]):
-            slope = np.cross(start_slope[:, i], direction) + np.cross(start, direction_slope[:, i])
-            slope /= length
-            stretch = line[0] * slope[0] + line[1] * slope[1]
-            view.line_slopes[b, edge, :, i] = slope - stretch * line
+        view.lines[body, edge] = line
+        view.faces[body, edge] = face
+        for i in range(jacobian.shape[2]):
+            derivative = np.cross(start_jacobian[:, i], direction) + np.cross(
+                start, direction_jacobian[:, i]
+            )
+            derivative /= length
+            stretch = line[0] * derivative[0] + line[1] * derivative[1]
+            view.line_jacobians[body, edge, :, i] = derivative - stretch * line
 
 
 @njit(cache=True, error_model="numpy")
 def _ends(
     ends: NDArray[np.float64], start: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> bool:
-    """Fill in where the part of an edge before the camera ends in the image, if there is any."""
+    """Fill in the ends in the image of the part of an edge that is in front of the camera.
+
+    Return whether there is such a part.
+    """
     low, high = -0.5, 0.5
     if direction[2] != 0.0:
-        cut = (MIN_DEPTH - start[2]) / direction[2]
+        crossing = (MIN_DEPTH - start[2]) / direction[2]
         if direction[2] > 0.0:
-            low = max(low, cut)
+            low = max(low, crossing)
         else:
-            high = min(high, cut)
+            high = min(high, crossing)
     elif start[2] < MIN_DEPTH:
         return False
     if low >= high:
@@ -159,70 +190,33 @@ def _ends(
 
 
 @njit(cache=True, error_model="numpy")
-def _bound(bounds: NDArray[np.float64], cube: NDArray[np.float64]) -> None:
-    """Fill in the rectangle of the image that holds the body."""
-    bounds[0], bounds[1], bounds[2], bounds[3] = np.inf, -np.inf, np.inf, -np.inf
+def _bound(solid: NDArray[np.float64], cube: NDArray[np.float64]) -> None:
+    """Fill in the body's bounding rectangle in the image."""
+    solid[LEFT], solid[RIGHT], solid[TOP], solid[BOTTOM] = np.inf, -np.inf, np.inf, -np.inf
     for corner in range(8):
         point = cube[:, 3].copy()
         for axis in range(3):
             point += ((corner >> axis) % 2 - 0.5) * cube[:, axis]
         if point[2] < MIN_DEPTH:
-            bounds[0], bounds[1], bounds[2], bounds[3] = -np.inf, np.inf, -np.inf, np.inf
+            solid[LEFT], solid[RIGHT], solid[TOP], solid[BOTTOM] = -np.inf, np.inf, -np.inf, np.inf
             return
         u, v = point[0] / point[2], point[1] / point[2]
-        bounds[0], bounds[1] = min(bounds[0], u), max(bounds[1], u)
-        bounds[2], bounds[3] = min(bounds[2], v), max(bounds[3], v)
+        solid[LEFT], solid[RIGHT] = min(solid[LEFT], u), max(solid[RIGHT], u)
+        solid[TOP], solid[BOTTOM] = min(solid[TOP], v), max(solid[BOTTOM], v)
 
 
 @njit(cache=True, error_model="numpy")
 def add_normal_equations(
     hessian: NDArray[np.float64],
     gradient: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
     moment: NDArray[np.float64],
     force: NDArray[np.float64],
 ) -> None:
-    """Add what a plane or a line of slopes (3, P) gets from its moments (3, 3) and force (3,)."""
-    for i in range(slopes.shape[1]):
+    """Add a plane or a line with a Jacobian (3, P), given its own moment (3, 3) and force (3,)."""
+    for i in range(jacobian.shape[1]):
         for k in range(3):
-            gradient[i] += slopes[k, i] * force[k]
+            gradient[i] += jacobian[k, i] * force[k]
             for c in range(3):
-                for j in range(slopes.shape[1]):
-                    hessian[i, j] += slopes[k, i] * moment[k, c] * slopes[c, j]
-
-
-@njit(cache=True, error_model="numpy")
-def raycast(solids: NDArray[np.float64], b: int, u: float, v: float) -> tuple[float, int]:
-    """Return the inverse depth and the face at which the ray of a pixel enters a body; 0, -1: none.
-
-    The ray is within the body from the last plane of a visible face to the first of the others.
-
-    Parameters
-    ----------
-    solids
-        Of the view; compiled code is slow with tuples of arrays in its inner loops.
-    """
-    if u < solids[b, 0] or u > solids[b, 1] or v < solids[b, 2] or v > solids[b, 3]:
-        return 0.0, -1
-    enter, leave, face = np.inf, 0.0, -1
-    for i in range(6):
-        k = PLANES + 3 * i
-        inverse_depth = solids[b, k] * u + solids[b, k + 1] * v + solids[b, k + 2]
-        if solids[b, VISIBLE + i] == 0.0:
-            leave = max(leave, inverse_depth)
-        elif inverse_depth < enter:
-            enter, face = inverse_depth, i
-    if face < 0 or enter <= leave:
-        return 0.0, -1
-    return enter, face
-
-
-@njit(cache=True, error_model="numpy")
-def raycast_any(solids: NDArray[np.float64], u: float, v: float) -> tuple[float, int, int]:
-    """Return inverse depth, body and face where the ray of a pixel meets the model first."""
-    nearest, body, face = 0.0, -1, -1
-    for b in range(solids.shape[0]):
-        inverse_depth, entered = raycast(solids, b, u, v)
-        if inverse_depth > nearest:
-            nearest, body, face = inverse_depth, b, entered
-    return nearest, body, face
+                for j in range(jacobian.shape[1]):
+                    hessian[i, j] += jacobian[k, i] * moment[k, c] * jacobian[c, j]

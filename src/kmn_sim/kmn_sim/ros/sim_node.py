@@ -20,18 +20,22 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.kinect_v1 import KinectV1
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros.stamps import stamp_of
 from kmn_sim.control.trajectory import TrajectoryError
-from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.ros import messages
 from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.recording import Recorder
+from kmn_sim.sensors.kinect import Kinect
+from kmn_sim.sensors.recording import Recorder, RecordingError
+from kmn_sim.sensors.settings import RecordingSettings
 from kmn_sim.world.runner import Runner
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
 CLOCK_PERIOD = 0.01  # simulated seconds between two messages on /clock
@@ -54,8 +58,9 @@ class SimNode(Node):
         self._settings = settings = SimNodeSettings.check(
             declare_parameters(self, "sim_node", DESCRIPTORS)
         )
+        self._world, self._recording = WorldSettings.load(), RecordingSettings.load()
         self._depth_camera = self._make_camera(settings)
-        self._statistics = SimulationStatistics(RobotSettings.load().names)
+        self._statistics = SimulationStatistics(self._world.robot.names)
         self._warnings = ThrottledWarnings(self)
         self._connect()
         self._runner = Runner(self._make_simulation, self._on_failure)
@@ -69,7 +74,11 @@ class SimNode(Node):
         self._recorder: Recorder | None = None
         self._recording_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
         self._runner.start()
-        self._change_recording(settings)
+        try:
+            self._exchange_recorder(self._make_recorder(settings), settings["record_rate"])
+        except RecordingError:
+            self._runner.close()
+            raise
         self._renderer = renderer = self._runner.call(lambda simulation: simulation.renderer.name)
         if renderer != settings["renderer"]:
             self.get_logger().warning(
@@ -86,13 +95,13 @@ class SimNode(Node):
     def destroy_node(self) -> None:
         """End the simulation's thread and the node."""
         self._runner.close()
-        if self._recorder is not None:
-            self._recorder.close()
+        self._close_recorder(self._recorder)
         super().destroy_node()
 
     def _connect(self) -> None:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
+        if self._settings["publish_clock"]:  # /clock is one for all nodes
+            self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
         self._joint_publisher = self.create_publisher(JointState, "joint_states", QUEUE_DEPTH)
         self._door_publisher = self.create_publisher(JointState, "door_state", QUEUE_DEPTH)
         self._truth_publisher = self.create_publisher(MorphingParameters, "ground_truth", latched)
@@ -104,6 +113,7 @@ class SimNode(Node):
         settings = self._settings
         return Simulation(
             settings.scenario,
+            self._world,
             settings["gui"],
             settings["renderer"],
             settings["interpolate_from_desired_state"],
@@ -111,17 +121,17 @@ class SimNode(Node):
 
     @staticmethod
     def _make_camera(settings: SimNodeSettings) -> DepthCamera:
-        return DepthCamera(
-            settings.camera, settings["camera_mount"], settings["noise"], settings["seed"]
-        )
+        noisy = settings["noise"] == "kinect"
+        kinect = Kinect(KinectV1.load(), settings["seed"]) if noisy else None
+        return DepthCamera(settings.camera, settings["camera_mount"], kinect)
 
     def _header(self, simulation: Simulation, frame: str) -> Header:
         """Return a header of the present, in simulated time if that is published."""
         now = simulation.time if self._settings["publish_clock"] else time.time()
-        return Header(stamp=messages.stamp_of(now), frame_id=frame)
+        return Header(stamp=stamp_of(now), frame_id=frame)
 
     def _publish_clock(self, simulation: Simulation) -> None:
-        self._clock_publisher.publish(ClockMessage(clock=messages.stamp_of(simulation.time)))
+        self._clock_publisher.publish(ClockMessage(clock=stamp_of(simulation.time)))
 
     def _publish_states(self, simulation: Simulation) -> None:
         header, robot = self._header(simulation, ""), simulation.robot
@@ -165,21 +175,43 @@ class SimNode(Node):
             )
 
     def _take_picture(self, simulation: Simulation) -> None:
-        if self._recorder is not None:
+        if self._recorder is None:
+            return
+        try:
             self._recorder.take(simulation)
+        except RecordingError as error:
+            self._recorder = None
+            self._lose_recording(error)
 
-    def _change_recording(self, settings: SimNodeSettings) -> None:
-        """Write the film that is being made, if any, and begin the one that is asked for."""
-        file, rate = settings["record"], settings["record_rate"]
-        recorder = Recorder(Path(file), rate) if file else None
+    def _make_recorder(self, settings: SimNodeSettings) -> Recorder | None:
+        """Begin the recording that is asked for, if any; raise ``RecordingError`` if it cannot."""
+        if not settings["record"]:
+            return None
+        return Recorder(Path(settings["record"]), settings["record_rate"], self._recording)
+
+    def _exchange_recorder(self, recorder: Recorder | None, rate: float) -> None:
+        """Complete the recording that is being made, if any, and go on with another one."""
 
         def exchange(simulation: Simulation) -> Recorder | None:
             before, self._recorder = self._recorder, recorder
+            self._take_picture(simulation)  # so that no recording is empty
             self._recording_task.period = 1.0 / rate
+            self._recording_task.due = simulation.time + self._recording_task.period
             return before
 
-        if (before := self._runner.call(exchange)) is not None:
-            before.close()
+        self._close_recorder(self._runner.call(exchange))
+
+    def _close_recorder(self, recorder: Recorder | None) -> None:
+        if recorder is None:
+            return
+        try:
+            recorder.close()
+        except RecordingError as error:
+            self._lose_recording(error)
+
+    def _lose_recording(self, error: RecordingError) -> None:
+        self._statistics.lose_recording()
+        self.get_logger().warning(str(error))
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
@@ -214,14 +246,16 @@ class SimNode(Node):
         """Take over changed parameters together, or refuse them with the reason."""
         try:
             settings = SimNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            records_anew = settings.differs(self._settings, RECORDING)
+            recorder = self._make_recorder(settings) if records_anew else None
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
             self._rebuild(settings)
         elif settings.differs(self._settings, SENSOR):
             self._depth_camera = self._make_camera(settings)
-        if settings.differs(self._settings, RECORDING):
-            self._change_recording(settings)
+        if records_anew:
+            self._exchange_recorder(recorder, settings["record_rate"])
         self._settings = settings
         self._runner.real_time_factor = settings["real_time_factor"]
         self._states_task.period = 1.0 / settings["joint_state_rate"]
@@ -229,6 +263,9 @@ class SimNode(Node):
         return SetParametersResult(successful=True)
 
     def _on_failure(self, error: Exception) -> None:
+        """Tell of an error of a task; after a signal nothing can be published, which is none."""
+        if not self.context.ok():
+            return
         self._statistics.fail()
         self._warnings.warn("internal_error", "".join(traceback.format_exception(error)))
 

@@ -113,6 +113,32 @@ def test_the_same_seed_makes_the_same_run(simulate: Simulate) -> None:
             np.testing.assert_allclose(one, again, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("model", "start"), [("door", (-3.3, 0.0, 0.0)), ("box_a", (0.0, -1.9, 1.5708))]
+)
+def test_the_base_starts_at_home_or_before_the_box(
+    simulate: Simulate, model: str, start: tuple[float, ...]
+) -> None:
+    simulation = simulate(model)
+    pose = simulation.robot.base_pose()
+    found = (*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0]))
+    np.testing.assert_allclose(found, start, atol=1e-9)
+    state = dict(zip(ROBOT.names, simulation.robot.state().positions, strict=True))
+    assert [state[name] for name in ROBOT.base_names] == pytest.approx(start)
+
+
+def test_the_stem_is_that_of_the_kinematic_model(simulate: Simulate) -> None:
+    values = [0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 0.05]
+    cubes = simulate(values=values, floor=False).unit_cubes()
+    without = simulate(values=values, floor=False, stem=False).unit_cubes()
+    np.testing.assert_array_equal(cubes[:-1], without)
+    stem = KinematicModel.load("door").stem
+    assert stem is not None
+    centre, size = stem.cuboid(values[3:])
+    np.testing.assert_allclose(cubes[-1][:3, 3], centre)
+    np.testing.assert_allclose(np.diag(cubes[-1][:3, :3]), size)
+
+
 @pytest.mark.parametrize("table", [False, True])
 @pytest.mark.parametrize("name", ["box_a", "box_b", "box_c"])
 def test_a_box_stands_still_where_it_was_put(simulate: Simulate, name: str, table: bool) -> None:

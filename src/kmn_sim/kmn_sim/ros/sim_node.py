@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -32,7 +31,8 @@ from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, RECORDING, SENSOR, WORL
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
 from kmn_sim.sensors.kinect import Kinect
-from kmn_sim.sensors.recording import Recorder, RecordingError
+from kmn_sim.sensors.recording import RecordingError
+from kmn_sim.sensors.recordings import Recordings
 from kmn_sim.sensors.settings import RecordingSettings
 from kmn_sim.world.runner import Runner
 from kmn_sim.world.settings import WorldSettings
@@ -58,7 +58,7 @@ class SimNode(Node):
         self._settings = settings = SimNodeSettings.check(
             declare_parameters(self, "sim_node", DESCRIPTORS)
         )
-        self._world, self._recording = WorldSettings.load(), RecordingSettings.load()
+        self._world = WorldSettings.load()
         self._depth_camera = self._make_camera(settings)
         self._statistics = SimulationStatistics(self._world.robot.names)
         self._warnings = ThrottledWarnings(self)
@@ -71,11 +71,13 @@ class SimNode(Node):
             1.0 / settings["joint_state_rate"], self._publish_states
         )
         self._camera_task = self._runner.every(1.0 / settings["camera_rate"], self._publish_camera)
-        self._recorder: Recorder | None = None
-        self._recording_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
+        self._recordings = Recordings(
+            self._runner, RecordingSettings.load(), self._on_lost_recording
+        )
         self._runner.start()
         try:
-            self._exchange_recorder(self._make_recorder(settings), settings["record_rate"])
+            recorder = self._recordings.prepare(settings["record"], settings["record_rate"])
+            self._recordings.exchange(recorder, settings["record_rate"])
         except RecordingError:
             self._runner.close()
             raise
@@ -95,7 +97,7 @@ class SimNode(Node):
     def destroy_node(self) -> None:
         """End the simulation's thread and the node."""
         self._runner.close()
-        self._close_recorder(self._recorder)
+        self._recordings.close()
         super().destroy_node()
 
     def _connect(self) -> None:
@@ -174,45 +176,6 @@ class SimNode(Node):
                 cloud_from_points(depth_to_points(depth, camera), header)
             )
 
-    def _take_picture(self, simulation: Simulation) -> None:
-        if self._recorder is None:
-            return
-        try:
-            self._recorder.take(simulation)
-        except RecordingError as error:
-            self._recorder = None
-            self._lose_recording(error)
-
-    def _make_recorder(self, settings: SimNodeSettings) -> Recorder | None:
-        """Begin the recording that is asked for, if any; raise ``RecordingError`` if it cannot."""
-        if not settings["record"]:
-            return None
-        return Recorder(Path(settings["record"]), settings["record_rate"], self._recording)
-
-    def _exchange_recorder(self, recorder: Recorder | None, rate: float) -> None:
-        """Complete the recording that is being made, if any, and go on with another one."""
-
-        def exchange(simulation: Simulation) -> Recorder | None:
-            before, self._recorder = self._recorder, recorder
-            self._take_picture(simulation)  # so that no recording is empty
-            self._recording_task.period = 1.0 / rate
-            self._recording_task.due = simulation.time + self._recording_task.period
-            return before
-
-        self._close_recorder(self._runner.call(exchange))
-
-    def _close_recorder(self, recorder: Recorder | None) -> None:
-        if recorder is None:
-            return
-        try:
-            recorder.close()
-        except RecordingError as error:
-            self._lose_recording(error)
-
-    def _lose_recording(self, error: RecordingError) -> None:
-        self._statistics.lose_recording()
-        self.get_logger().warning(str(error))
-
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
             self._runner.call(lambda simulation: self._accept(simulation, message))
@@ -247,7 +210,8 @@ class SimNode(Node):
         try:
             settings = SimNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
             records_anew = settings.differs(self._settings, RECORDING)
-            recorder = self._make_recorder(settings) if records_anew else None
+            name = settings["record"] if records_anew else ""
+            recorder = self._recordings.prepare(name, settings["record_rate"])
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
@@ -255,12 +219,16 @@ class SimNode(Node):
         elif settings.differs(self._settings, SENSOR):
             self._depth_camera = self._make_camera(settings)
         if records_anew:
-            self._exchange_recorder(recorder, settings["record_rate"])
+            self._recordings.exchange(recorder, settings["record_rate"])
         self._settings = settings
         self._runner.real_time_factor = settings["real_time_factor"]
         self._states_task.period = 1.0 / settings["joint_state_rate"]
         self._camera_task.period = 1.0 / settings["camera_rate"]
         return SetParametersResult(successful=True)
+
+    def _on_lost_recording(self, error: RecordingError) -> None:
+        self._statistics.lose_recording()
+        self.get_logger().warning(str(error))
 
     def _on_failure(self, error: Exception) -> None:
         """Tell of an error of a task; after a signal nothing can be published, which is none."""

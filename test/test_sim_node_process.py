@@ -33,7 +33,7 @@ def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> 
         ("placement:=somewhere", "'placement' must be one of"),
         ("values:=[1.0]", "has 7 parameters"),
         ("camera_rate:=0.0", "camera_rate"),
-        ("record:=/nowhere/film.gif", "'record' must be a file"),
+        ("record:=/nowhere/run.gif", "'record' must be a file"),
     ],
 )
 def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:

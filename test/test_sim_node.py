@@ -5,68 +5,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sim_client import SimClient
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from graph import GraphClient
-from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.ros.messages import camera_from_info, depth_from_image, points_from_cloud
+from kmn_perception.ros.stamps import seconds, stamp_of
 
 pytest.importorskip("pybullet")
-from kmn_sim.ros.messages import seconds, stamp_of  # noqa: E402
 from kmn_sim.ros.sim_node import SimNode  # noqa: E402
 
 ARM = ["l_shoulder_pan_joint", "l_elbow_flex_joint"]
-
-
-class SimClient(GraphClient):
-    """Commands sim_node and keeps what it publishes."""
-
-    def __init__(self, graph: Any) -> None:
-        super().__init__(graph, "sim_node")
-        self.joints: list[JointState] = []
-        self.doors: list[JointState] = []
-        self.truths: list[MorphingParameters] = []
-        self.images: list[Image] = []
-        self.infos: list[CameraInfo] = []
-        self.clouds: list[PointCloud2] = []
-        self.clocks: list[Clock] = []
-        for kind, name, kept in (
-            (JointState, "joint_states", self.joints),
-            (JointState, "door_state", self.doors),
-            (MorphingParameters, "ground_truth", self.truths),
-            (Clock, "/clock", self.clocks),
-        ):
-            self.create_subscription(kind, name, kept.append, 100)
-        self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
-        self.reset = self.create_client(Trigger, "reset")
-
-    def now(self) -> float:
-        """Return the simulated time, seconds."""
-        self.clocks.clear()
-        return seconds(self.graph.wait_for(lambda: self.clocks)[-1].clock)
-
-    def wait_until(self, time: float) -> None:
-        """Wait until a simulated time, seconds, is over."""
-        self.graph.wait_for(lambda: self.now() > time)
-
-    def position(self, joint: str) -> float:
-        state = self.joints[-1]
-        return float(state.position[list(state.name).index(joint)])
-
-    def wait_until_at(self, joint: str, position: float) -> None:
-        self.graph.wait_for(lambda: abs(self.position(joint) - position) < 0.01)
 
 
 @pytest.fixture(scope="module")
@@ -226,15 +183,6 @@ def test_a_wrong_parameter_is_refused_with_the_reason(
     assert text in result.reason
 
 
-def test_parts_of_a_run_are_filmed(client: SimClient, tmp_path: Path) -> None:
-    for name in ("first", "second"):
-        film = tmp_path / f"{name}.mp4"
-        assert client.set(record=str(film), record_rate=5.0).successful
-        client.wait_until(client.now() + 3.0)  # the clocks lag behind on a busy machine
-        assert client.set(record="").successful
-        assert cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_COUNT) >= 5
-
-
 def test_boxes_have_no_door_state(client: SimClient) -> None:
     assert client.set(model="box_c", table=True).successful
     client.truths.clear()
@@ -250,6 +198,18 @@ def test_the_clock_is_that_of_the_stamps(client: SimClient) -> None:
     client.graph.wait_for(lambda: client.clocks and client.joints)
     clock, stamp = seconds(client.clocks[-1].clock), seconds(client.joints[-1].header.stamp)
     assert clock == pytest.approx(stamp, abs=1.0)
+
+
+def test_a_clock_is_published_only_where_it_is_asked_for(graph: Any, sim: SimNode) -> None:
+    silent = graph.start(SimNode, namespace="silent")
+
+    def published(namespace: str) -> list[str]:
+        topics = silent.get_publisher_names_and_types_by_node("sim_node", namespace)
+        return [name for name, _ in topics]
+
+    assert "/silent/joint_states" in published("/silent")
+    assert "/clock" not in published("/silent")
+    assert [end.node_namespace for end in sim.get_publishers_info_by_topic("/clock")] == ["/"]
 
 
 def test_the_real_time_factor_is_kept(client: SimClient) -> None:

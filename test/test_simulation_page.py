@@ -23,6 +23,16 @@ def test_every_parameter_stands_there_with_its_default() -> None:
     assert file["/**"]["ros__parameters"].keys() == DESCRIPTORS.keys()
 
 
+def test_every_file_and_folder_that_it_names_is_there() -> None:
+    root = Path(__file__).parents[1]
+    for name in re.findall(r"`(config/[\w/]+\.yaml)`", PAGE):
+        assert (root / name).is_file(), name
+    table = PAGE[PAGE.index("| folder | content |") :]
+    folders = re.findall(r"^\| `(\w+)`", table, flags=re.MULTILINE)
+    package = root / "src/kmn_sim/kmn_sim"
+    assert set(folders) == {file.parent.name for file in package.glob("*/__init__.py")}
+
+
 def test_every_executable_stands_there() -> None:
     rows = set(re.findall(r"^\| `(\w+)", PAGE, flags=re.MULTILINE))
     assert {"sim_node", "snapshot", "check_perception", "benchmark", "robot_description"} <= rows

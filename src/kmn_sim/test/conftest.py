@@ -11,6 +11,7 @@ import pytest
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
 MakeSimulation = Callable[..., Simulation]
@@ -25,7 +26,8 @@ def simulate() -> Iterator[MakeSimulation]:
             kinematic = KinematicModel.load(model)
             values = np.zeros(len(kinematic.parameters)) if values is None else np.array(values)
             renderer = options.pop("renderer", "egl")
-            simulation = Simulation(Scenario(kinematic, values, **options), renderer=renderer)
+            scenario = Scenario(kinematic, values, **options)
+            simulation = Simulation(scenario, WorldSettings.load(), renderer=renderer)
             return stack.enter_context(closing(simulation))
 
         yield make

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
-from kmn_sim.sensors.clipping import nearest_depth
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.renderer import RENDERERS
+from kmn_sim.world.clipping import nearest_depth
+from kmn_sim.world.renderer import RENDERERS
 from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
 Simulate = Callable[..., Simulation]
@@ -25,7 +26,7 @@ MODELS: dict[str, Any] = {"door": {"frame": True}, "box_c": {"table": True}, "bo
 @pytest.fixture(scope="module", params=RENDERERS)
 def simulation(request: pytest.FixtureRequest) -> Simulation:
     model = KinematicModel.load("door")
-    return Simulation(Scenario(model, np.zeros(7)), renderer=request.param)
+    return Simulation(Scenario(model, np.zeros(7)), WorldSettings.load(), renderer=request.param)
 
 
 def surface(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -44,7 +45,7 @@ def test_depth_is_that_of_exact_ray_casting(simulation: Simulation, name: str) -
     for values in model.sample(np.random.default_rng(3), 4):
         simulation.build(Scenario(model, values, **MODELS[name]))
         exact = render(simulation.unit_cubes(), model.camera)
-        depth = DepthCamera(model.camera, "world", "none", 0).capture(simulation)
+        depth = DepthCamera(model.camera).capture(simulation)
         assert (np.isfinite(depth) != np.isfinite(exact)).mean() < 1e-3
         error = np.abs(depth - exact)[surface(exact)]
         assert error.max() <= 1e-3
@@ -70,7 +71,7 @@ def test_the_robot_is_behind_the_camera_and_seen_from_elsewhere(simulate: Simula
 
 def test_a_camera_on_the_base_moves_with_it(simulate: Simulate) -> None:
     simulation = simulate()
-    head = DepthCamera(Camera.load("pr2_head"), "base", "none", 0)
+    head = DepthCamera(Camera.load("pr2_head"), "base")
     before = head.camera(simulation).pose
     for joint, value in zip(("base_x", "base_y", "base_yaw"), (-2.0, 0.5, 0.3), strict=True):
         simulation.physics.resetJointState(

@@ -19,7 +19,7 @@ TIPS = ("l_gripper_l_finger_tip_joint", "l_gripper_r_finger_tip_joint")
 
 
 def move_gripper(simulation: Simulation, angle: float) -> None:
-    command = Command((RobotSettings.load().leader,), [Waypoint(0.5, (angle,))])
+    command = Command((RobotSettings.load().gripper.joint,), [Waypoint(0.5, (angle,))])
     simulation.controller.accept(command, simulation.time)
 
 

@@ -7,15 +7,16 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinect_v1 import KinectV1
 from kmn_sim.checks.check_noise import compare
 from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
-from kmn_sim.sensors.kinect import Kinect, KinectSettings
+from kmn_sim.sensors.kinect import Kinect
 
 FX = Camera.load("kinect_v1").fx
 
 
 def kinect(seed: int = 0) -> Kinect:
-    return Kinect(KinectSettings.load(), seed)
+    return Kinect(KinectV1.load(), seed)
 
 
 def plane(distance: float) -> NDArray[np.float32]:
@@ -72,7 +73,7 @@ def test_noise_about_a_tilted_plane_is_measured_without_the_tilt() -> None:
     rows = np.arange(60.0)[:, None] + np.zeros((1, 80))
     exact = 1.0 / (1.0 + 2e-3 * rows)
     noisy = exact + np.random.default_rng(0).normal(scale=2e-3, size=exact.shape)
-    means, deviations = plane_noise(noisy.astype(np.float32), np.ones(exact.shape, dtype=bool))
+    means, deviations = plane_noise(noisy.astype(np.float32), np.ones(exact.shape, dtype=bool), 15)
     assert len(means) == 15
     assert deviations.mean() == pytest.approx(2e-3, rel=0.05)
     assert means.min() > exact.min() and means.max() < exact.max()
@@ -84,8 +85,8 @@ def test_missing_runs_are_counted_beside_the_object_alone() -> None:
     box[10:20, 50:80] = True
     depth[10:20, 45:50] = np.nan
     depth[10:15, 80:] = np.nan  # these runs end nowhere
-    assert missing_runs(depth, box, ~box, -1).tolist() == [-1] * 10 + [5] * 10 + [-1] * 100
-    assert missing_runs(depth, box, ~box, 1).tolist() == [-1] * 15 + [0] * 5 + [-1] * 100
+    assert missing_runs(depth, box, ~box, -1, 10).tolist() == [-1] * 10 + [5] * 10 + [-1] * 100
+    assert missing_runs(depth, box, ~box, 1, 10).tolist() == [-1] * 15 + [0] * 5 + [-1] * 100
 
 
 def test_steps_of_depth_are_found() -> None:

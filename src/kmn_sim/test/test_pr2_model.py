@@ -29,15 +29,15 @@ def test_forward_kinematics_is_that_of_the_source(simulate: Simulate) -> None:
         for name, (low, high) in robot.limits.items():
             value = generator.uniform(max(low, -3.0), min(high, 3.0))
             simulation.physics.resetJointState(robot.body, robot.link(name), value)
-            if name == settings.leader:
-                for follower in settings.followers:
+            if name == settings.gripper.joint:
+                for follower in settings.gripper.followers:
                     simulation.physics.resetJointState(robot.body, robot.link(follower), value)
             values[name] = value
-        base = [values.pop(name) for name in settings.names[:3]]
-        source.getFrame("worldTranslationRotation").setJointState(base)
+        base = [values.pop(name) for name in settings.base_names]
+        source.getFrame(settings.base).setJointState(base)
         for name, value in values.items():
             source.getFrame(name).setJointState([value])
-        for name in (*settings.names[3:], *settings.followers):
+        for name in (*settings.arm_names, *settings.finger_names):
             found = simulation.physics.getLinkState(robot.body, robot.link(name), 0, 1)[4:6]
             expected = source.getFrame(name)
             np.testing.assert_allclose(found[0], expected.getPosition(), atol=1e-6)
@@ -62,9 +62,8 @@ def test_efforts_and_masses_reach_the_engine(simulate: Simulate) -> None:
     for name, motor in settings.joints.items():
         info = simulation.physics.getJointInfo(robot.body, robot.link(name))
         assert info[10:12] == (motor.effort, motor.velocity)
-        assert info[12].decode() == ("base_link" if name == "base_yaw" else link_name(name)) or (
-            name in settings.names[:2]
-        )
+        links = {"base_x": "base_x_link", "base_y": "base_y_link", "base_yaw": "base_link"}
+        assert info[12].decode() == links.get(name, link_name(name, settings.base))
     masses = [
         simulation.physics.getDynamicsInfo(robot.body, link)[0]
         for link in range(simulation.physics.getNumJoints(robot.body))
@@ -81,13 +80,13 @@ def test_a_missing_package_is_named_with_what_to_do(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setitem(sys.modules, "robotic", None)
     with pytest.raises(pr2_model.RobotModelError, match="make setup-simulation"):
-        pr2_model.pr2_urdf()
+        pr2_model.pr2_urdf(RobotSettings.load())
     assert list((tmp_path / "kmn_sim").iterdir()) == []
 
 
 def test_the_model_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    file = pr2_model.pr2_urdf()
+    file = pr2_model.pr2_urdf(RobotSettings.load())
     made = file.stat().st_mtime_ns
-    assert pr2_model.pr2_urdf().stat().st_mtime_ns == made
+    assert pr2_model.pr2_urdf(RobotSettings.load()).stat().st_mtime_ns == made
     assert file.parent.parent == tmp_path / "kmn_sim"

@@ -10,12 +10,13 @@ import pytest
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.world.runner import Runner
 from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
 
 def make() -> Simulation:
     model = KinematicModel.load("door")
-    return Simulation(Scenario(model, np.zeros(7)), renderer="software")
+    return Simulation(Scenario(model, np.zeros(7)), WorldSettings.load(), renderer="software")
 
 
 @pytest.fixture

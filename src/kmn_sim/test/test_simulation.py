@@ -9,16 +9,25 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from kmn_perception.model.kinect_v1 import KinectV1
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.sensors.kinect import Kinect
 from kmn_sim.world.scenario import Scenario, ScenarioError
 from kmn_sim.world.simulation import Simulation
 
 Simulate = Callable[..., Simulation]
-ARM = RobotSettings.load().names[3:10]
+ROBOT = RobotSettings.load()
+ARM = ROBOT.arm_names
 REACH = (0.4, 0.2, 0.8, -1.2, 0.5, -0.9, 1.2)
+
+
+def arm(simulation: Simulation) -> list[float]:
+    """Return the positions of the arm's joints."""
+    positions = dict(zip(ROBOT.names, simulation.robot.state().positions, strict=True))
+    return [positions[name] for name in ARM]
 
 
 def reach(simulation: Simulation, seconds: float = 3.0) -> None:
@@ -35,7 +44,7 @@ def test_the_arm_follows_a_trajectory_closely(simulate: Simulate) -> None:
         error = simulation.desired.positions - simulation.robot.state().positions
         largest = max(largest, float(np.abs(error).max()))
     assert largest < 0.01
-    np.testing.assert_allclose(simulation.robot.state().positions[3:10], REACH, atol=1e-3)
+    np.testing.assert_allclose(arm(simulation), REACH, atol=1e-3)
 
 
 def test_gravity_is_compensated_in_any_posture(simulate: Simulate) -> None:
@@ -50,13 +59,13 @@ def test_gravity_is_compensated_in_any_posture(simulate: Simulate) -> None:
 
 def test_efforts_stay_within_those_of_the_pr2(simulate: Simulate) -> None:
     simulation = simulate()
-    efforts = np.array([motor.effort for motor in RobotSettings.load().joints.values()])
+    efforts = np.array([motor.effort for motor in ROBOT.joints.values()])
     reach(simulation, seconds=0.1)  # far faster than it can
     for _ in range(120):
         simulation.step()
         assert (np.abs(simulation.robot.efforts()) <= efforts * (1.0 + 1e-6)).all()
     simulation.run(2.0)
-    np.testing.assert_allclose(simulation.robot.state().positions[3:10], REACH, atol=0.01)
+    np.testing.assert_allclose(arm(simulation), REACH, atol=0.01)
 
 
 def test_a_blocked_arm_does_not_go_through_what_blocks_it(simulate: Simulate) -> None:
@@ -72,12 +81,11 @@ def test_a_blocked_arm_does_not_go_through_what_blocks_it(simulate: Simulate) ->
 
 def test_fingers_close_together(simulate: Simulate) -> None:
     simulation = simulate()
-    settings = RobotSettings.load()
     for target in (0.5, 0.05):
-        command = Command((settings.leader,), [Waypoint(1.0, (target,))])
+        command = Command((ROBOT.gripper.joint,), [Waypoint(1.0, (target,))])
         simulation.controller.accept(command, simulation.time)
         simulation.run(1.5)
-        for name in (settings.leader, *settings.followers):
+        for name in ROBOT.finger_names:
             link = simulation.robot.link(name)
             angle = simulation.physics.getJointState(simulation.robot.body, link)[0]
             assert angle == pytest.approx(target, abs=0.03), name
@@ -85,7 +93,7 @@ def test_fingers_close_together(simulate: Simulate) -> None:
 
 def run(simulation: Simulation) -> list[NDArray[Any]]:
     """Return what happens in a run with an arm that moves and a noisy camera."""
-    camera = DepthCamera(simulation.scenario.model.camera, "world", "kinect", seed=5)
+    camera = DepthCamera(simulation.scenario.model.camera, "world", Kinect(KinectV1.load(), seed=5))
     reach(simulation, 0.5)
     seen: list[NDArray[Any]] = []
     for _ in range(3):
@@ -103,6 +111,32 @@ def test_the_same_seed_makes_the_same_run(simulate: Simulate) -> None:
         np.testing.assert_array_equal(one, two)
         if one.ndim == 1:  # at another time, the trajectory's times are rounded otherwise
             np.testing.assert_allclose(one, again, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "start"), [("door", (-3.3, 0.0, 0.0)), ("box_a", (0.0, -1.9, 1.5708))]
+)
+def test_the_base_starts_at_home_or_before_the_box(
+    simulate: Simulate, model: str, start: tuple[float, ...]
+) -> None:
+    simulation = simulate(model)
+    pose = simulation.robot.base_pose()
+    found = (*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0]))
+    np.testing.assert_allclose(found, start, atol=1e-9)
+    state = dict(zip(ROBOT.names, simulation.robot.state().positions, strict=True))
+    assert [state[name] for name in ROBOT.base_names] == pytest.approx(start)
+
+
+def test_the_stem_is_that_of_the_kinematic_model(simulate: Simulate) -> None:
+    values = [0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 0.05]
+    cubes = simulate(values=values, floor=False).unit_cubes()
+    without = simulate(values=values, floor=False, stem=False).unit_cubes()
+    np.testing.assert_array_equal(cubes[:-1], without)
+    stem = KinematicModel.load("door").stem
+    assert stem is not None
+    centre, size = stem.cuboid(values[3:])
+    np.testing.assert_allclose(cubes[-1][:3, 3], centre)
+    np.testing.assert_allclose(np.diag(cubes[-1][:3, :3]), size)
 
 
 @pytest.mark.parametrize("table", [False, True])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.experiments.settings import FaceSettings
+from kmn_perception.model.kinect_v1 import KinectV1
 
 SIDES = ("-x", "+x", "-y", "+y", "top")
 TOP = 4
@@ -47,10 +48,9 @@ def box_axes(yaw: float) -> NDArray[np.float64]:
     return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def axial_noise(depth: NDArray[np.float64], settings: FaceSettings) -> NDArray[np.float64]:
+def axial_noise(depth: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviation of a Kinect's depth (Nguyen, Izadi and Lovell, 2012)."""
-    offset, slope, centre = settings.noise
-    return offset + slope * (depth - centre) ** 2
+    return KinectV1.load().axial.nguyen.deviation(depth)
 
 
 def smoothed_normals(
@@ -104,7 +104,7 @@ def fit_faces(
     yaw = float(np.angle(np.exp(4j * angle).mean()) / 4.0)
     origin = p[:, :2].mean(axis=0)
     p = np.column_stack([p[:, :2] - origin, p[:, 2]])
-    sigma = axial_noise(z, settings)
+    sigma = axial_noise(z)
     blocks = (rows // settings.block) * 10_000 + columns // settings.block
     faces = Faces(origin, yaw, np.nan, np.full(5, np.nan), np.full(5, np.nan))
     for _ in range(settings.steps):

@@ -139,7 +139,7 @@ def measure(
 
 def _fit_table(points: NDArray[np.float64], settings: FaceSettings) -> SupportPlane:
     """Fit a plane to points (N, 3) in the optical frame, each by its own noise."""
-    exact = 1.0 / axial_noise(points[:, 2], settings)
+    exact = 1.0 / axial_noise(points[:, 2])
     weight = exact.copy()
     for _ in range(TABLE_STEPS):
         centre = np.average(points, axis=0, weights=weight**2)

@@ -22,15 +22,8 @@ NUMBERS = ("visible", "match", "tight", "wrong", "confidence", "unseen")
 
 @dataclass(frozen=True)
 class FaceSettings:
-    """How planes are fitted to faces; see the comments in the file.
+    """How planes are fitted to faces; see the comments in the file."""
 
-    Attributes
-    ----------
-    noise
-        Offset (m), slope (1/m) and centre (m) of the sensor's depth noise.
-    """
-
-    noise: tuple[float, float, float]
     normal_window: int
     normal_reach: int
     min_pixels: int
@@ -106,11 +99,10 @@ class ExperimentSettings:
 
 
 def _faces(section: Section) -> FaceSettings:
-    section.allow(("noise", *FACE_COUNTS, *FACE_NUMBERS))
-    offset, slope, centre = section.numbers("noise", 3)
+    section.allow((*FACE_COUNTS, *FACE_NUMBERS))
     counts = {name: section.whole_number(name, 1, 1000) for name in FACE_COUNTS}
     numbers = {name: section.number(name, 0.0, 100.0) for name in FACE_NUMBERS}
-    return FaceSettings((offset, slope, centre), **counts, **numbers)  # type: ignore[arg-type]
+    return FaceSettings(**counts, **numbers)  # type: ignore[arg-type]
 
 
 def _contour(section: Section) -> ContourSettings:

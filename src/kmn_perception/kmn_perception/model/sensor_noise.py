@@ -6,13 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-NOISES = ("none", "mm", "kinect")
+from kmn_perception.model.kinect_v1 import KinectV1
 
-# Kinect v1: Nguyen, Izadi and Lovell (2012) for axial and lateral noise; the disparity is measured
-# with a baseline of 75 mm at 575.8 px and comes in steps of 1/8 px.
-AXIAL_OFFSET, AXIAL_SLOPE, AXIAL_CENTRE = 0.0012, 0.0019, 0.4
-LATERAL_PIXELS = 0.8
-DISPARITY_SCALE, DISPARITY_STEP = 0.075 * 575.8, 0.125
+NOISES = ("none", "mm", "kinect")
 
 
 def add_noise(
@@ -24,32 +20,43 @@ def add_noise(
     ----------
     noise
         ``none``; ``mm``: steps of 1 mm; ``kinect``: a Kinect v1 with lateral noise that frays the
-        edges, axial noise, and the steps of its disparity.
+        edges, axial noise (Nguyen et al.), and the steps of its disparity.
     """
     if noise == "none":
         return depth
     if noise == "mm":
         return (np.round(depth * 1e3) / 1e3).astype(np.float32)
-    return _kinect(depth, generator)
+    sensor = KinectV1.load()
+    disparity = sensor.disparity
+    return _kinect(
+        depth, sensor.lateral, *sensor.axial.nguyen, disparity.scale, disparity.step, generator
+    )
 
 
 @njit(cache=True)
-def _kinect(depth: NDArray[np.float32], generator: np.random.Generator) -> NDArray[np.float32]:
+def _kinect(
+    depth: NDArray[np.float32],
+    lateral: float,
+    offset: float,
+    slope: float,
+    centre: float,
+    scale: float,
+    step: float,
+    generator: np.random.Generator,
+) -> NDArray[np.float32]:
     """Let every pixel look a little beside itself, and measure that depth with noise, in steps."""
     height, width = depth.shape
     noisy = np.full_like(depth, np.nan)
     v0, v1, u0, u1 = _window(depth, reach=4)
     for v in range(v0, v1):
         for u in range(u0, u1):
-            row = v + int(np.rint(LATERAL_PIXELS * generator.standard_normal()))
-            column = u + int(np.rint(LATERAL_PIXELS * generator.standard_normal()))
+            row = v + int(np.rint(lateral * generator.standard_normal()))
+            column = u + int(np.rint(lateral * generator.standard_normal()))
             z = depth[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
             if not np.isnan(z):
-                sigma = AXIAL_OFFSET + AXIAL_SLOPE * (z - AXIAL_CENTRE) ** 2
-                disparity = DISPARITY_SCALE / (z + sigma * generator.standard_normal())
-                noisy[v, u] = DISPARITY_SCALE / (
-                    np.rint(disparity / DISPARITY_STEP) * DISPARITY_STEP
-                )
+                sigma = offset + slope * (z - centre) ** 2
+                disparity = scale / (z + sigma * generator.standard_normal())
+                noisy[v, u] = scale / (np.rint(disparity / step) * step)
     return noisy
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,17 +18,13 @@ from kmn_perception.ros.node_process import ProcessError
 from kmn_perception.ros.program import ros_session
 from kmn_sim.checks.check_perception import whole_scenes
 from kmn_sim.checks.scene_client import scene_client
+from kmn_sim.checks.settings import BenchmarkSettings, PerceptionCheckSettings, TouchPoint
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.renderer import RENDERERS
+from kmn_sim.world.renderer import RENDERERS
 from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
-
-MODEL = "door"
-SIMULATED = 4.0  # seconds
-CAMERA_RATE = 10.0  # frames a second
-FRAMES = 20
-CONTACT = -0.83, -0.3  # base x and y (m) where the outstretched hand touches the door
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
@@ -39,40 +35,42 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def real_time_factor(simulation: Simulation, camera: DepthCamera | None) -> float:
+def real_time_factor(
+    simulation: Simulation, camera: DepthCamera | None, settings: BenchmarkSettings
+) -> float:
     """Return the simulated seconds in one second, of a robot that touches the door."""
     simulation.build(simulation.scenario)
-    touch(simulation)
-    frame_steps = round(1.0 / (CAMERA_RATE * simulation.step_time))
+    touch(simulation, settings.touch)
+    frame_steps = round(1.0 / (settings.camera_rate * simulation.step_time))
     start = time.perf_counter()
-    for step in range(round(SIMULATED / simulation.step_time)):
+    for step in range(round(settings.duration / simulation.step_time)):
         simulation.step()
         if camera is not None and step % frame_steps == 0:
             camera.capture(simulation)
-    return SIMULATED / (time.perf_counter() - start)
+    return settings.duration / (time.perf_counter() - start)
 
 
-def touch(simulation: Simulation) -> None:
+def touch(simulation: Simulation, points: Sequence[TouchPoint]) -> None:
     """Drive the robot with outstretched arm against the door."""
-    names = tuple(simulation.robot.limits)
-    position = simulation.robot.state().positions.copy()
-    position[3:10] = 0.0, 0.4, 0.0, -0.8, 0.0, -0.4, 0.0
-    arm = Waypoint(1.0, tuple(position))
-    position[:2] = CONTACT
-    there = Waypoint(4.0, tuple(position))
-    simulation.controller.accept(Command(names, [arm, there]), simulation.time)
-    simulation.run(4.0)
+    names, state = tuple(simulation.robot.limits), simulation.robot.state()
+    position = dict(zip(names, state.positions.tolist(), strict=True))
+    waypoints = []
+    for point in points:
+        position |= point.joints
+        waypoints.append(Waypoint(point.time, tuple(position.values())))
+    simulation.controller.accept(Command(names, waypoints), simulation.time)
+    simulation.run(points[-1].time)
     assert simulation.door is not None
     bodies = simulation.robot.body, simulation.door.body
     if not simulation.physics.getContactPoints(*bodies):
         raise ProcessError("the robot does not touch the door")
 
 
-def milliseconds(work: Callable[[], object]) -> float:
+def milliseconds(work: Callable[[], object], repetitions: int) -> float:
     """Return the median duration of some work that is done again and again."""
     work()
     durations = []
-    for _ in range(FRAMES):
+    for _ in range(repetitions):
         start = time.perf_counter()
         work()
         durations.append(1e3 * (time.perf_counter() - start))
@@ -81,20 +79,24 @@ def milliseconds(work: Callable[[], object]) -> float:
 
 def benchmark(scenes: int) -> dict[str, Any]:
     """Return all measurements, as written to JSON."""
-    model = KinematicModel.load(MODEL)
-    scenario = Scenario(model, np.zeros(len(model.parameters)))
-    camera = DepthCamera(model.camera, "world", "none", 0)
+    settings, check_settings = BenchmarkSettings.load(), PerceptionCheckSettings.load()
+    model, world = KinematicModel.load(settings.model), WorldSettings.load()
+    scenario, camera = Scenario(model, model.prototype), DepthCamera(model.camera)
     factors, depth_ms = {}, {}
     for wanted in RENDERERS:
-        simulation = Simulation(scenario, renderer=wanted)
+        simulation = Simulation(scenario, world, renderer=wanted)
         name = simulation.renderer.name
-        depth_ms[name] = milliseconds(lambda: camera.capture(simulation))  # noqa: B023
+        depth_ms[name] = milliseconds(
+            lambda: camera.capture(simulation),  # noqa: B023
+            settings.frames,
+        )
         if wanted == RENDERERS[0]:
-            factors["physics"] = real_time_factor(simulation, None)
-            factors["with_camera"] = real_time_factor(simulation, camera)
+            factors["physics"] = real_time_factor(simulation, None, settings)
+            factors["with_camera"] = real_time_factor(simulation, camera, settings)
         simulation.close()
-    with scene_client(model, MODEL, "none", 0) as live:
-        latencies = [1e3 * live.show(values).latency for values in whole_scenes(model, 0, scenes)]
+    drawn = whole_scenes(model, 0, scenes, check_settings.margin)
+    with scene_client(model, settings.model, "none", 0, check_settings) as client:
+        latencies = [1e3 * client.show(values).latency for values in drawn]
     return {
         "real_time_factor": factors,
         "depth_ms": depth_ms,

@@ -15,53 +15,19 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
 from kmn_perception.estimator import Status
 from kmn_perception.experiments.experiment import load_pipeline
 from kmn_perception.experiments.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinect_v1 import KinectV1
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.scene.camera_pose import NoCameraPoseError
 from kmn_perception.scene.depth_view import DepthView
 from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
-from kmn_sim.sensors.kinect import Kinect, KinectSettings
-
-
-class CheckSettings(NamedTuple):
-    """How the two are compared.
-
-    Attributes
-    ----------
-    camera
-        Of the real frames.
-    table
-        Size of the simulated table, metres.
-    distances, reach
-        Where the noise about the table is told, and how far about each distance, metres.
-    levels
-        Depths between which their steps are counted, metres.
-    """
-
-    camera: Camera
-    table: list[float]
-    distances: list[float]
-    reach: float
-    levels: tuple[float, float]
-
-    @classmethod
-    def load(cls) -> CheckSettings:
-        """Read ``config/simulation/check_noise.yaml``."""
-        section = Section.load(resources.find("config/simulation", "check_noise"))
-        section.allow(cls._fields)
-        return cls(
-            camera=Camera.load(section.text("camera")),
-            table=section.numbers("table", 3),
-            distances=section.numbers("distances"),
-            reach=section.number("reach", 0.0),
-            levels=section.limits("levels"),
-        )
+from kmn_sim.checks.settings import NoiseCheckSettings
+from kmn_sim.sensors.kinect import Kinect
 
 
 class Frame(NamedTuple):
@@ -79,12 +45,14 @@ class Twins(NamedTuple):
     simulated: Frame
 
 
-def twins(frames: Sequence[LabelledFrame], settings: CheckSettings, seed: int) -> Iterator[Twins]:
+def twins(
+    frames: Sequence[LabelledFrame], settings: NoiseCheckSettings, seed: int
+) -> Iterator[Twins]:
     """Yield real frames with their simulated twins; frames without an estimate are left out."""
-    pipeline, sensor = load_pipeline(), KinectSettings.load()
+    pipeline, sensor, camera = load_pipeline(), KinectV1.load(), Camera.load(settings.camera)
     for number, frame in enumerate(frames):
         real = Frame(frame.depth, frame.labels == TABLE, frame.labels == frame.objects[0])
-        scene = scene_of(real, settings.camera, pipeline)
+        scene = scene_of(real, camera, pipeline)
         if scene is not None:
             yield Twins(real, simulate(*scene, settings.table, Kinect(sensor, seed + number)))
 
@@ -120,9 +88,9 @@ def simulate(
     return Frame(depth.astype(np.float32), np.isfinite(exact) & ~is_box, is_box)
 
 
-def noise(images: Sequence[Frame], settings: CheckSettings) -> dict[str, float]:
+def noise(images: Sequence[Frame], settings: NoiseCheckSettings) -> dict[str, float]:
     """Return the noise about the table by distance, and the steps of the depth."""
-    patches = [plane_noise(image.depth, image.table) for image in images]
+    patches = [plane_noise(image.depth, image.table, settings.patch) for image in images]
     means, deviations = (np.concatenate(parts) for parts in zip(*patches, strict=True))
     result = {}
     for distance in settings.distances:
@@ -133,12 +101,16 @@ def noise(images: Sequence[Frame], settings: CheckSettings) -> dict[str, float]:
     return result
 
 
-def missing(pairs: Sequence[Twins]) -> list[dict[str, float]]:
+def missing(pairs: Sequence[Twins], min_width: int) -> list[dict[str, float]]:
     """Return what is missing beside the boxes, of the rows that both images of a pair show."""
     results: list[dict[str, float]] = [{}, {}]
     for side, step in (("left", -1), ("right", 1)):
         runs = np.concatenate(
-            [[missing_runs(f.depth, f.box, f.table, step) for f in pair] for pair in pairs], axis=1
+            [
+                [missing_runs(f.depth, f.box, f.table, step, min_width) for f in pair]
+                for pair in pairs
+            ],
+            axis=1,
         )
         for result, known in zip(results, runs[:, (runs >= 0).all(axis=0)], strict=True):
             for name, percentile in (("median", 50.0), ("90 %", 90.0)):
@@ -151,12 +123,12 @@ def missing(pairs: Sequence[Twins]) -> list[dict[str, float]]:
 def compare(count: int, seed: int) -> dict[str, dict[str, float]]:
     """Return the statistics ``real`` and ``simulated`` of at most so many frames."""
     frames = read_frames(resources.share_directory() / "data" / "kinect_boxes")[:count]
-    settings = CheckSettings.load()
+    settings = NoiseCheckSettings.load()
     pairs = list(tqdm(twins(frames, settings, seed), total=len(frames), unit="frame"))
     return {
         name: {**noise(images, settings), **beside}
         for name, images, beside in zip(
-            Twins._fields, zip(*pairs, strict=True), missing(pairs), strict=True
+            Twins._fields, zip(*pairs, strict=True), missing(pairs, settings.min_width), strict=True
         )
     }
 

@@ -17,10 +17,8 @@ from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import ros_session
 from kmn_sim.checks.scene_client import SceneEstimate, scene_client
+from kmn_sim.checks.settings import PerceptionCheckSettings
 from kmn_sim.sensors.kinect import NOISES
-
-TOLERANCE = 0.01  # metres, radians and scales
-MARGIN = 2.0  # pixels of the image around what is wholly in view
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
@@ -34,24 +32,26 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def whole_scenes(model: KinematicModel, seed: int, count: int) -> Iterator[NDArray[np.float64]]:
+def whole_scenes(
+    model: KinematicModel, seed: int, count: int, margin: float
+) -> Iterator[NDArray[np.float64]]:
     """Draw morphing parameters (n + m,) of objects that are wholly in the camera's view."""
     generator = np.random.default_rng(seed)
     while count:
         values = model.sample(generator, 1)[0]
-        if in_view(model.unit_cubes(*model.split(values)), model.camera):
+        if in_view(model.unit_cubes(*model.split(values)), model.camera, margin):
             count -= 1
             yield values
 
 
-def in_view(unit_cubes: NDArray[np.float64], camera: Camera) -> bool:
-    """Tell whether all corners of cuboids (B, 4, 4) lie in the image."""
+def in_view(unit_cubes: NDArray[np.float64], camera: Camera, margin: float) -> bool:
+    """Tell whether all corners of cuboids (B, 4, 4) lie in the image, off its border in pixels."""
     signs = np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3, [1.0]), axis=-1).reshape(8, 4)
     corners = camera.world_to_camera @ unit_cubes @ signs.T
     x, y, z, _ = np.moveaxis(corners, 1, 0)
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-    inside = (u > MARGIN) & (u < camera.width - 1 - MARGIN)
-    inside &= (v > MARGIN) & (v < camera.height - 1 - MARGIN) & (z > camera.near)
+    inside = (u > margin) & (u < camera.width - 1 - margin)
+    inside &= (v > margin) & (v < camera.height - 1 - margin) & (z > camera.near)
     return bool(inside.all())
 
 
@@ -63,13 +63,14 @@ def errors(model: KinematicModel, answer: SceneEstimate) -> NDArray[np.float64]:
 
 def check(options: argparse.Namespace) -> dict[str, Any]:
     """Show the scenes, print their errors as they come, and return all as written to JSON."""
-    model = KinematicModel.load(options.model)
+    model, settings = KinematicModel.load(options.model), PerceptionCheckSettings.load()
     names = [parameter.name for parameter in model.parameters]
+    drawn = whole_scenes(model, options.seed, options.scenes, settings.margin)
     scenes = []
-    with scene_client(model, options.model, options.noise, options.seed) as live:
+    with scene_client(model, options.model, options.noise, options.seed, settings) as client:
         print(columns([["scene", *names, "status", "ms"]]), flush=True)
-        for number, values in enumerate(whole_scenes(model, options.seed, options.scenes)):
-            answer = live.show(values)
+        for number, values in enumerate(drawn):
+            answer = client.show(values)
             error = errors(model, answer)
             texts = [f"{number:5d}", *(f"{e:.4f}" for e in error)]
             texts += [answer.reason or "OK", f"{1e3 * answer.latency:.0f}"]
@@ -82,7 +83,7 @@ def check(options: argparse.Namespace) -> dict[str, Any]:
                     "status": answer.status,
                     "reason": answer.reason,
                     "latency_ms": 1e3 * answer.latency,
-                    "within": bool(answer.status == 0 and (error <= TOLERANCE).all()),
+                    "within": bool(answer.status == 0 and (error <= settings.tolerance).all()),
                 }
             )
     return {
@@ -90,7 +91,7 @@ def check(options: argparse.Namespace) -> dict[str, Any]:
         "parameters": names,
         "seed": options.seed,
         "noise": options.noise,
-        "tolerance": TOLERANCE,
+        "tolerance": settings.tolerance,
         "within": sum(scene["within"] for scene in scenes),
         "scenes": scenes,
     }

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-PATCH = 15  # pixels; side of the squares whose noise is taken
-MIN_WIDTH = 10  # pixels; narrower rows of an object are not looked at
-
 
 def plane_noise(
-    depth: NDArray[np.float32], surface: NDArray[np.bool_]
+    depth: NDArray[np.float32], surface: NDArray[np.bool_], patch: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return mean depth (N,) and standard deviation about the plane (N,) of patches, metres.
 
@@ -20,19 +17,21 @@ def plane_noise(
         (height, width) metres, NaN for none.
     surface
         (height, width) where there is a plane.
+    patch
+        Side of the patches, which are squares, in pixels.
     """
-    rows, columns = np.mgrid[:PATCH, :PATCH]
+    rows, columns = np.mgrid[:patch, :patch]
     # 1 / z of a plane is linear in the pixel's coordinates.
-    design = np.column_stack([rows.ravel(), columns.ravel(), np.ones(PATCH**2)])
-    onto = np.eye(PATCH**2) - design @ np.linalg.pinv(design)
+    design = np.column_stack([rows.ravel(), columns.ravel(), np.ones(patch**2)])
+    onto = np.eye(patch**2) - design @ np.linalg.pinv(design)
     means, deviations = [], []
-    for v in range(0, depth.shape[0] - PATCH, PATCH):
-        for u in range(0, depth.shape[1] - PATCH, PATCH):
-            patch = np.s_[v : v + PATCH, u : u + PATCH]
-            if surface[patch].all() and np.isfinite(depth[patch]).all():
-                inverse = 1.0 / depth[patch].astype(np.float64).ravel()
+    for v in range(0, depth.shape[0] - patch, patch):
+        for u in range(0, depth.shape[1] - patch, patch):
+            square = np.s_[v : v + patch, u : u + patch]
+            if surface[square].all() and np.isfinite(depth[square]).all():
+                inverse = 1.0 / depth[square].astype(np.float64).ravel()
                 mean = 1.0 / inverse.mean()
-                freedom = PATCH**2 - design.shape[1]
+                freedom = patch**2 - design.shape[1]
                 error = onto @ inverse * mean**2
                 means.append(mean)
                 deviations.append(np.sqrt(error @ error / freedom))
@@ -44,6 +43,7 @@ def missing_runs(
     object_: NDArray[np.bool_],
     background: NDArray[np.bool_],
     step: int,
+    min_width: int,
 ) -> NDArray[np.int64]:
     """Return how many pixels are missing beside an object in each row (height,), -1 if unknown.
 
@@ -55,12 +55,14 @@ def missing_runs(
         (height, width) pixels of the two; a run that does not end at the background is unknown.
     step
         -1 to the left of the object, 1 to the right.
+    min_width
+        Rows with fewer measured pixels of the object are unknown.
     """
     runs = np.full(depth.shape[0], -1)
     measured = np.isfinite(depth)
     for v in range(depth.shape[0]):
         columns = np.flatnonzero(object_[v] & measured[v])
-        if len(columns) < MIN_WIDTH:
+        if len(columns) < min_width:
             continue
         beside = np.arange(columns.max() + 1, depth.shape[1])
         if step < 0:

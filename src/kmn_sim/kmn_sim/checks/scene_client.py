@@ -19,11 +19,8 @@ from rclpy.node import Node
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
-from kmn_sim.ros.messages import seconds
-
-START_TIMEOUT = 180.0  # seconds for both nodes to load and compile
-ANSWER_TIMEOUT = 30.0  # seconds for the parameters of a scene
-CAMERA_RATE = 4.0  # frames a second; morph_node shall not fall behind
+from kmn_perception.ros.stamps import seconds
+from kmn_sim.checks.settings import PerceptionCheckSettings
 
 
 class SceneEstimate(NamedTuple):
@@ -53,9 +50,14 @@ class SceneClient:
         In the namespace of the two.
     processes
         The two, which are watched.
+    settings
+        How long to wait.
     """
 
-    def __init__(self, node: Node, processes: list[NodeProcess]) -> None:
+    def __init__(
+        self, node: Node, processes: list[NodeProcess], settings: PerceptionCheckSettings
+    ) -> None:
+        self._timeout = settings.answer_timeout
         self._client = ProcessClient(node, processes)
         self._estimates: list[tuple[MorphingParameters, float]] = []
         self._truths: list[MorphingParameters] = []
@@ -64,10 +66,10 @@ class SceneClient:
         self._setting = node.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )
-        self._client.wait(self._setting.service_is_ready, START_TIMEOUT, "sim_node")
+        self._client.wait(self._setting.service_is_ready, settings.start_timeout, "sim_node")
         self._client.wait(
             lambda: node.count_publishers(f"{node.get_namespace()}/morphed_model"),
-            START_TIMEOUT,
+            settings.start_timeout,
             "morph_node",
         )
 
@@ -80,10 +82,10 @@ class SceneClient:
             If a node has ended, or there is no answer.
         """
         scene = {"placement": "given", "values": [float(value) for value in values]}
-        self._client.set_parameters(self._setting, scene, ANSWER_TIMEOUT)
+        self._client.set_parameters(self._setting, scene, self._timeout)
         self._truths.clear()
         self._estimates.clear()
-        estimate, received = self._client.wait(self._answered, ANSWER_TIMEOUT, "morph_node")
+        estimate, received = self._client.wait(self._answered, self._timeout, "morph_node")
         truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
         return SceneEstimate(
             np.array([*truth.theta, *truth.gamma]),
@@ -103,7 +105,9 @@ class SceneClient:
 
 
 @contextmanager
-def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Iterator[SceneClient]:
+def scene_client(
+    model: KinematicModel, name: str, noise: str, seed: int, settings: PerceptionCheckSettings
+) -> Iterator[SceneClient]:
     """Start both nodes in a namespace of their own, for the scenes of a model.
 
     Parameters
@@ -112,6 +116,8 @@ def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Ite
         The model's name or file.
     noise, seed
         Of the simulated sensor.
+    settings
+        Of the camera's rate, and how long to wait.
     """
     alone = f"__ns:=/sim_{os.getpid()}"  # whatever else runs here is not disturbed
     sim: dict[str, Any] = {
@@ -119,7 +125,7 @@ def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Ite
         "placement": "given",
         "values": [0.0] * len(model.parameters),
     }
-    sim |= {"noise": noise, "seed": seed, "camera_rate": CAMERA_RATE}
+    sim |= {"noise": noise, "seed": seed, "camera_rate": settings.camera_rate}
     morph = {"model": name, "reliability": "reliable"}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -136,4 +142,4 @@ def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Ite
         ]
         node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])
         stack.callback(node.destroy_node)
-        yield SceneClient(node, processes)
+        yield SceneClient(node, processes, settings)

@@ -11,12 +11,11 @@ import numpy as np
 
 from kmn_perception.command_line.arguments import output_file
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_sim.sensors.recording import snapshot
+from kmn_sim.sensors.settings import RecordingSettings
+from kmn_sim.sensors.snapshot import snapshot
 from kmn_sim.world.scenario import DIRECTIONS, Scenario
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
-
-WIDTH, HEIGHT = 960, 720
-SETTLING = 0.2  # simulated seconds
 
 
 def arguments() -> argparse.Namespace:
@@ -55,9 +54,10 @@ def main() -> int:
     """Run the executable ``snapshot``."""
     options = arguments()
     try:
-        simulation = Simulation(scenario_of(options))
-        simulation.run(SETTLING)
-        picture = snapshot(simulation, WIDTH, HEIGHT)
+        settings = RecordingSettings.load()
+        simulation = Simulation(scenario_of(options), WorldSettings.load())
+        simulation.run(settings.settling)
+        picture = snapshot(simulation, settings, settings.snapshot)
         simulation.close()
         if not cv2.imwrite(str(options.out), np.ascontiguousarray(picture[..., ::-1])):
             raise OSError(f"cannot write {options.out}")

@@ -7,6 +7,7 @@ are fixed where the model has them, and what they carry becomes part of the link
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,15 +16,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.robot.settings import Colours, RobotSettings
 
-BASE = "worldTranslationRotation"
-BASE_LIMITS = ((-10.0, 10.0), (-10.0, 10.0), (-6.0, 6.0))  # metres, metres, radians; of the model
 BASE_AXES = (("prismatic", "1 0 0"), ("prismatic", "0 1 0"), ("revolute", "0 0 1"))
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-SMALL_MASS, SMALL_INERTIA = 0.1, 1e-3  # of the base's first two links, kg and kg m^2
-DARK_PARTS = ("finger", "caster", "wheel")
-LIGHT, DARK = "0.86 0.87 0.89 1", "0.22 0.23 0.26 1"
+BASE_LINK = "base_link"
 NOTICE = (
     "Generated from the PR2 model of the package robotic; from PR2/pr2_common pr2_description, "
     "Copyright Willow Garage, Inc., BSD licence."
@@ -52,29 +49,29 @@ def export(settings: RobotSettings, folder: Path) -> None:
     configuration.addFile(robotic.raiPath(settings.source))
     robot = ElementTree.Element("robot", name="pr2")
     robot.append(ElementTree.Comment(NOTICE))
-    movable = {BASE, *settings.joints, *settings.followers} - set(settings.names[:3])
+    moved = {settings.base, *settings.arm_names, *settings.finger_names}
     _base_joints(robot, settings)
     frames = [configuration.getFrame(name) for name in configuration.getFrameNames()]
-    carrier = {frame.name: _carrier(frame, movable) for frame in frames}
+    carrier = {frame.name: _carrier(frame, moved) for frame in frames}
     for frame in frames:
-        if frame.name in movable:
+        if frame.name in moved:
             parts = [part for part in frames if carrier[part.name] == frame.name]
-            robot.append(_link(frame, parts, folder))
-        if frame.name in movable and frame.name != BASE:
+            robot.append(_link(frame, parts, settings, folder))
+        if frame.name in moved and frame.name != settings.base:
             parent = configuration.getFrame(carrier[frame.getParent().name])
             robot.append(_joint(frame, parent, settings))
     ElementTree.indent(robot)
     ElementTree.ElementTree(robot).write(folder / "pr2.urdf", encoding="utf-8")
 
 
-def link_name(joint: str) -> str:
-    """Return the name of the link that a joint of the model moves."""
-    return "base_link" if joint == BASE else joint.replace("_joint", "_link")
+def link_name(joint: str, base: str) -> str:
+    """Return the name of the link that a joint of the model moves, ``base`` being its first one."""
+    return BASE_LINK if joint == base else joint.replace("_joint", "_link")
 
 
-def _carrier(frame: Any, movable: set[str]) -> str | None:
-    """Return the movable frame that a frame is fixed to; None for the world."""
-    while frame is not None and frame.name not in movable:
+def _carrier(frame: Any, moved: set[str]) -> str | None:
+    """Return the moved frame that a frame is fixed to; None for the world."""
+    while frame is not None and frame.name not in moved:
         frame = frame.getParent()
     return None if frame is None else str(frame.name)
 
@@ -86,19 +83,22 @@ def _relative(frame: Any, origin: Any) -> NDArray[np.float64]:
 
 
 def _base_joints(robot: ElementTree.Element, settings: RobotSettings) -> None:
-    """Add the chain of the links world, base_x and base_y, up to base_link."""
+    """Add the chain of links from the world to base_link."""
+    base = settings.simulation.base
     ElementTree.SubElement(robot, "link", name="world")
-    small = Inertia(SMALL_MASS, np.zeros(3), SMALL_INERTIA * np.eye(3))
-    links = ["world", "base_x_link", "base_y_link", link_name(BASE)]
-    for name in links[1:3]:
-        robot.append(_inertial_link(name, small))
-    for i, name in enumerate(settings.names[:3]):
-        kind, axis = BASE_AXES[i]
+    inertia = Inertia(base.mass, np.zeros(3), base.inertia * np.eye(3))
+    between = [f"{name}_link" for name in settings.base_names[:-1]]
+    for name in between:
+        robot.append(_inertial_link(name, inertia))
+    chain = itertools.pairwise(["world", *between, BASE_LINK])
+    for (parent, child), (kind, axis), (name, limits) in zip(
+        chain, BASE_AXES, base.limits.items(), strict=True
+    ):
         joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
-        ElementTree.SubElement(joint, "parent", link=links[i])
-        ElementTree.SubElement(joint, "child", link=links[i + 1])
+        ElementTree.SubElement(joint, "parent", link=parent)
+        ElementTree.SubElement(joint, "child", link=child)
         ElementTree.SubElement(joint, "axis", xyz=axis)
-        joint.append(_limit(BASE_LIMITS[i], settings, name))
+        joint.append(_limit(limits, settings, name))
 
 
 def _joint(frame: Any, parent: Any, settings: RobotSettings) -> ElementTree.Element:
@@ -109,8 +109,8 @@ def _joint(frame: Any, parent: Any, settings: RobotSettings) -> ElementTree.Elem
     joint = ElementTree.Element(
         "joint", name=frame.name, type="revolute" if limits else "continuous"
     )
-    ElementTree.SubElement(joint, "parent", link=link_name(parent.name))
-    ElementTree.SubElement(joint, "child", link=link_name(frame.name))
+    ElementTree.SubElement(joint, "parent", link=link_name(parent.name, settings.base))
+    ElementTree.SubElement(joint, "child", link=link_name(frame.name, settings.base))
     joint.append(_origin(_relative(frame.getParent(), parent)))
     ElementTree.SubElement(joint, "axis", xyz=_text(axis))
     joint.append(_limit(limits, settings, frame.name))
@@ -120,17 +120,19 @@ def _joint(frame: Any, parent: Any, settings: RobotSettings) -> ElementTree.Elem
 def _limit(
     limits: tuple[float, float] | None, settings: RobotSettings, name: str
 ) -> ElementTree.Element:
-    motor = settings.joints[settings.leader if name in settings.followers else name]
+    motor = settings.joints[name if name in settings.joints else settings.gripper.joint]
     attributes = {"effort": f"{motor.effort}", "velocity": f"{motor.velocity}"}
     if limits is not None:
         attributes.update(lower=f"{limits[0]}", upper=f"{limits[1]}")
     return ElementTree.Element("limit", attributes)
 
 
-def _link(frame: Any, parts: list[Any], folder: Path) -> ElementTree.Element:
+def _link(
+    frame: Any, parts: list[Any], settings: RobotSettings, folder: Path
+) -> ElementTree.Element:
     """Return the link of all parts that are fixed to a frame, in that frame."""
     link = _inertial_link(
-        link_name(frame.name),
+        link_name(frame.name, settings.base),
         _together([inertia for part in parts if (inertia := _inertia(part, frame)).mass > 0.0]),
     )
     for part in parts:
@@ -143,11 +145,17 @@ def _link(frame: Any, parts: list[Any], folder: Path) -> ElementTree.Element:
             geometry = ElementTree.SubElement(element, "geometry")
             ElementTree.SubElement(geometry, "mesh", filename=file.name)
             if kind == "visual":
-                shade = "dark" if any(word in part.name for word in DARK_PARTS) else "light"
-                material = ElementTree.SubElement(element, "material", name=shade)
-                colour = DARK if shade == "dark" else LIGHT
-                ElementTree.SubElement(material, "color", rgba=colour)
+                element.append(_material(part.name, settings.simulation.colours))
     return link
+
+
+def _material(mesh: str, colours: Colours) -> ElementTree.Element:
+    """Return the material of a mesh by its name."""
+    is_dark = any(word in mesh for word in colours.dark_parts)
+    material = ElementTree.Element("material", name="dark" if is_dark else "light")
+    colour = colours.dark if is_dark else colours.light
+    ElementTree.SubElement(material, "color", rgba=_text(colour))
+    return material
 
 
 def _inertia(part: Any, frame: Any) -> Inertia:

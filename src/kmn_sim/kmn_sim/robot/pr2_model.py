@@ -6,11 +6,12 @@ import os
 import shutil
 import sys
 import tempfile
+from dataclasses import replace
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_sim.robot import pr2_export
 from kmn_sim.robot.settings import RobotSettings
 
@@ -27,15 +28,15 @@ def cache_directory() -> Path:
     return Path(root) / "kmn_sim"
 
 
-def pr2_urdf() -> Path:
-    """Return the URDF of the PR2, which the first call generates.
+def pr2_urdf(settings: RobotSettings) -> Path:
+    """Return the URDF of the PR2, which the first call with these settings generates.
 
     Raises
     ------
     RobotModelError
         If it is not there and the package robotic, from which it is made, is missing.
     """
-    folder = cache_directory() / f"pr2-{_key()}"
+    folder = cache_directory() / f"pr2-{_key(settings)}"
     file = folder / "pr2.urdf"
     if file.is_file():
         return file
@@ -43,7 +44,7 @@ def pr2_urdf() -> Path:
     # Made aside and moved as a whole, so that another process never sees half of it.
     made = Path(tempfile.mkdtemp(prefix="pr2-", dir=folder.parent))
     try:
-        pr2_export.export(RobotSettings.load(), made)
+        pr2_export.export(settings, made)
         made.rename(folder)
     except (ImportError, OSError) as error:
         if file.is_file():  # another process was faster
@@ -54,13 +55,13 @@ def pr2_urdf() -> Path:
     return file
 
 
-def _key() -> str:
+def _key(settings: RobotSettings) -> str:
     """Name what the generated model depends on: the package, the settings, the generator."""
     try:
         source = version("robotic")
     except PackageNotFoundError as error:
         raise RobotModelError(f"the package robotic with the PR2 is missing; {HINT}") from error
-    digest = sha256(resources.find("config/simulation", "pr2").read_bytes())
+    digest = sha256(repr(replace(settings, planning=None)).encode())
     digest.update(Path(pr2_export.__file__).read_bytes())
     return f"{source}-{digest.hexdigest()[:12]}"
 
@@ -68,8 +69,8 @@ def _key() -> str:
 def main() -> int:
     """Make the model ready, as the set-up does."""
     try:
-        print(pr2_urdf())
-    except RobotModelError as error:
+        print(pr2_urdf(RobotSettings.load()))
+    except (RobotModelError, ConfigurationError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.model.transformation import rotation_z
 from kmn_sim.control.interpolation import State
 from kmn_sim.robot.settings import RobotSettings
 
 UNLIMITED = 1e6  # radians; of joints that turn on and on
-HAND_LINKS = ("finger",)  # parts of link names whose contact is that of the grip
+GEAR_CORRECTION = 0.2  # part of the error between two geared joints that a step takes away
 
 
 class SimulatedRobot:
-    """The robot, with its base on a floor of a given height.
+    """The robot, with its base on a floor.
+
+    Parameters
+    ----------
+    physics
+        Client of the physics engine.
+    urdf, settings
+        The robot's model, and what it lacks.
+    start
+        Positions by name of joints that start elsewhere than at home, m and rad.
+    floor
+        Height of the floor, metres.
+    step_time
+        Of the physics, seconds.
 
     Attributes
     ----------
@@ -32,11 +46,11 @@ class SimulatedRobot:
         physics: Any,
         urdf: Path,
         settings: RobotSettings,
-        base: Sequence[float],
+        start: Mapping[str, float],
         floor: float,
         step_time: float,
     ) -> None:
-        self._physics, self._settings = physics, settings
+        self._physics, self._settings, self._floor = physics, settings, floor
         self.body: int = physics.loadURDF(
             str(urdf),
             basePosition=(0.0, 0.0, floor),
@@ -52,8 +66,9 @@ class SimulatedRobot:
         self.limits = {name: _limits(self._joints[name]) for name in settings.names}
         self._efforts = [motor.effort for motor in settings.joints.values()]
         self._speeds = np.array([motor.velocity for motor in settings.joints.values()])
-        self._gain = settings.position_gain / step_time
-        self._place(base)
+        self._gain = settings.simulation.position_gain / step_time
+        for name, position in {**settings.home, **start}.items():
+            physics.resetJointState(self.body, self.link(name), position)
         self._set_contacts()
         self._couple_fingers()
 
@@ -66,6 +81,14 @@ class SimulatedRobot:
         states = self._physics.getJointStates(self.body, self._moved)
         positions, velocities = (np.array([state[i] for state in states]) for i in (0, 1))
         return State(positions, velocities, np.zeros_like(positions))
+
+    def base_pose(self) -> NDArray[np.float64]:
+        """Return the pose (4, 4) of the base on the floor, in the world."""
+        joints = [self.link(name) for name in self._settings.base_names]
+        x, y, yaw = (state[0] for state in self._physics.getJointStates(self.body, joints))
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = rotation_z(yaw), (x, y, self._floor)
+        return pose
 
     def efforts(self) -> NDArray[np.float64]:
         """Return the efforts (J,) of the motors in the last step, N and N m."""
@@ -88,34 +111,25 @@ class SimulatedRobot:
     def _info(self, joint: int) -> Any:
         return self._physics.getJointInfo(self.body, joint)
 
-    def _place(self, base: Sequence[float]) -> None:
-        """Put all joints where they start, the base at x, y, yaw."""
-        homes = [*base, *[motor.home for motor in self._settings.joints.values()][3:]]
-        starts = dict(zip(self._settings.names, homes, strict=True))
-        for name in self._settings.followers:
-            starts[name] = starts[self._settings.leader]
-        for name, position in starts.items():
-            self._physics.resetJointState(self.body, self._joints[name][0], position)
-
     def _set_contacts(self) -> None:
         """Give the fingers their friction, and take away the engine's own damping."""
+        grip = self._settings.simulation
         for name, info in self._joints.items():
             self._physics.changeDynamics(
                 self.body, info[0], linearDamping=0.0, angularDamping=0.0, jointDamping=0.0
             )
-            if any(part in name for part in HAND_LINKS):
+            if name in self._settings.finger_names:
                 self._physics.changeDynamics(
                     self.body,
                     info[0],
-                    lateralFriction=self._settings.friction,
-                    spinningFriction=self._settings.spinning_friction,
+                    lateralFriction=grip.friction,
+                    spinningFriction=grip.spinning_friction,
                 )
 
     def _couple_fingers(self) -> None:
         """Gear the gripper's joints to the first one; the engine ignores mimic joints."""
-        leader = self._joints[self._settings.leader][0]
-        for name in self._settings.followers:
-            follower = self._joints[name][0]
+        leader, *followers = map(self.link, self._settings.finger_names)
+        for follower in followers:
             self._physics.setJointMotorControl2(
                 self.body, follower, self._physics.VELOCITY_CONTROL, force=0.0
             )
@@ -130,7 +144,10 @@ class SimulatedRobot:
                 childFramePosition=(0.0, 0.0, 0.0),
             )
             self._physics.changeConstraint(
-                gear, gearRatio=-1.0, maxForce=self._settings.follower_effort, erp=0.2
+                gear,
+                gearRatio=-1.0,
+                maxForce=self._settings.simulation.follower_effort,
+                erp=GEAR_CORRECTION,
             )
 
     def _compensate_gravity(self) -> None:

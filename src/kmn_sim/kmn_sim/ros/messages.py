@@ -5,28 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from builtin_interfaces.msg import Duration, Time
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.ros.stamps import seconds
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.world.scenario import Scenario
-
-NANO = 1e-9
-
-
-def seconds(stamp: Time | Duration) -> float:
-    """Return a stamp or a duration in seconds."""
-    return float(stamp.sec + NANO * stamp.nanosec)
-
-
-def stamp_of(time: float) -> Time:
-    """Return the stamp of a time in seconds."""
-    nanoseconds = round(time / NANO)
-    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
 def command_from_message(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -20,18 +19,23 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.kinect_v1 import KinectV1
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros.stamps import stamp_of
 from kmn_sim.control.trajectory import TrajectoryError
-from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.ros import messages
 from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.recording import Recorder
+from kmn_sim.sensors.kinect import Kinect
+from kmn_sim.sensors.recording import RecordingError
+from kmn_sim.sensors.recordings import Recordings
+from kmn_sim.sensors.settings import RecordingSettings
 from kmn_sim.world.runner import Runner
+from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
 CLOCK_PERIOD = 0.01  # simulated seconds between two messages on /clock
@@ -54,8 +58,9 @@ class SimNode(Node):
         self._settings = settings = SimNodeSettings.check(
             declare_parameters(self, "sim_node", DESCRIPTORS)
         )
+        self._world = WorldSettings.load()
         self._depth_camera = self._make_camera(settings)
-        self._statistics = SimulationStatistics(RobotSettings.load().names)
+        self._statistics = SimulationStatistics(self._world.robot.names)
         self._warnings = ThrottledWarnings(self)
         self._connect()
         self._runner = Runner(self._make_simulation, self._on_failure)
@@ -66,10 +71,16 @@ class SimNode(Node):
             1.0 / settings["joint_state_rate"], self._publish_states
         )
         self._camera_task = self._runner.every(1.0 / settings["camera_rate"], self._publish_camera)
-        self._recorder: Recorder | None = None
-        self._recording_task = self._runner.every(1.0 / settings["record_rate"], self._take_picture)
+        self._recordings = Recordings(
+            self._runner, RecordingSettings.load(), self._on_lost_recording
+        )
         self._runner.start()
-        self._change_recording(settings)
+        try:
+            recorder = self._recordings.prepare(settings["record"], settings["record_rate"])
+            self._recordings.exchange(recorder, settings["record_rate"])
+        except RecordingError:
+            self._runner.close()
+            raise
         self._renderer = renderer = self._runner.call(lambda simulation: simulation.renderer.name)
         if renderer != settings["renderer"]:
             self.get_logger().warning(
@@ -86,13 +97,13 @@ class SimNode(Node):
     def destroy_node(self) -> None:
         """End the simulation's thread and the node."""
         self._runner.close()
-        if self._recorder is not None:
-            self._recorder.close()
+        self._recordings.close()
         super().destroy_node()
 
     def _connect(self) -> None:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
+        if self._settings["publish_clock"]:  # /clock is one for all nodes
+            self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
         self._joint_publisher = self.create_publisher(JointState, "joint_states", QUEUE_DEPTH)
         self._door_publisher = self.create_publisher(JointState, "door_state", QUEUE_DEPTH)
         self._truth_publisher = self.create_publisher(MorphingParameters, "ground_truth", latched)
@@ -104,6 +115,7 @@ class SimNode(Node):
         settings = self._settings
         return Simulation(
             settings.scenario,
+            self._world,
             settings["gui"],
             settings["renderer"],
             settings["interpolate_from_desired_state"],
@@ -111,17 +123,17 @@ class SimNode(Node):
 
     @staticmethod
     def _make_camera(settings: SimNodeSettings) -> DepthCamera:
-        return DepthCamera(
-            settings.camera, settings["camera_mount"], settings["noise"], settings["seed"]
-        )
+        noisy = settings["noise"] == "kinect"
+        kinect = Kinect(KinectV1.load(), settings["seed"]) if noisy else None
+        return DepthCamera(settings.camera, settings["camera_mount"], kinect)
 
     def _header(self, simulation: Simulation, frame: str) -> Header:
         """Return a header of the present, in simulated time if that is published."""
         now = simulation.time if self._settings["publish_clock"] else time.time()
-        return Header(stamp=messages.stamp_of(now), frame_id=frame)
+        return Header(stamp=stamp_of(now), frame_id=frame)
 
     def _publish_clock(self, simulation: Simulation) -> None:
-        self._clock_publisher.publish(ClockMessage(clock=messages.stamp_of(simulation.time)))
+        self._clock_publisher.publish(ClockMessage(clock=stamp_of(simulation.time)))
 
     def _publish_states(self, simulation: Simulation) -> None:
         header, robot = self._header(simulation, ""), simulation.robot
@@ -164,23 +176,6 @@ class SimNode(Node):
                 cloud_from_points(depth_to_points(depth, camera), header)
             )
 
-    def _take_picture(self, simulation: Simulation) -> None:
-        if self._recorder is not None:
-            self._recorder.take(simulation)
-
-    def _change_recording(self, settings: SimNodeSettings) -> None:
-        """Write the film that is being made, if any, and begin the one that is asked for."""
-        file, rate = settings["record"], settings["record_rate"]
-        recorder = Recorder(Path(file), rate) if file else None
-
-        def exchange(simulation: Simulation) -> Recorder | None:
-            before, self._recorder = self._recorder, recorder
-            self._recording_task.period = 1.0 / rate
-            return before
-
-        if (before := self._runner.call(exchange)) is not None:
-            before.close()
-
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
             self._runner.call(lambda simulation: self._accept(simulation, message))
@@ -214,21 +209,31 @@ class SimNode(Node):
         """Take over changed parameters together, or refuse them with the reason."""
         try:
             settings = SimNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            records_anew = settings.differs(self._settings, RECORDING)
+            name = settings["record"] if records_anew else ""
+            recorder = self._recordings.prepare(name, settings["record_rate"])
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
             self._rebuild(settings)
         elif settings.differs(self._settings, SENSOR):
             self._depth_camera = self._make_camera(settings)
-        if settings.differs(self._settings, RECORDING):
-            self._change_recording(settings)
+        if records_anew:
+            self._recordings.exchange(recorder, settings["record_rate"])
         self._settings = settings
         self._runner.real_time_factor = settings["real_time_factor"]
         self._states_task.period = 1.0 / settings["joint_state_rate"]
         self._camera_task.period = 1.0 / settings["camera_rate"]
         return SetParametersResult(successful=True)
 
+    def _on_lost_recording(self, error: RecordingError) -> None:
+        self._statistics.lose_recording()
+        self.get_logger().warning(str(error))
+
     def _on_failure(self, error: Exception) -> None:
+        """Tell of an error of a task; after a signal nothing can be published, which is none."""
+        if not self.context.ok():
+            return
         self._statistics.fail()
         self._warnings.warn("internal_error", "".join(traceback.format_exception(error)))
 

@@ -23,7 +23,7 @@ from kmn_perception.ros.parameters import (
 from kmn_sim.sensors.depth_camera import MOUNTS
 from kmn_sim.sensors.kinect import NOISES
 from kmn_sim.sensors.recording import FORMATS
-from kmn_sim.sensors.renderer import RENDERERS
+from kmn_sim.world.renderer import RENDERERS
 from kmn_sim.world.scenario import DIRECTIONS, Scenario
 
 PLACEMENTS = ("prototype", "random", "given")

@@ -22,7 +22,7 @@ class SimulationStatistics:
         self._error = np.zeros(len(joints))
         self._progress: float | None = None
         self._accepted, self._refused = 0, Counter[str]()
-        self._failures = 0
+        self._failures, self._recordings_lost = 0, 0
         self._last = "no trajectory received yet"
 
     def accept(self) -> None:
@@ -41,6 +41,11 @@ class SimulationStatistics:
         """Count an internal error."""
         with self._lock:
             self._failures += 1
+
+    def lose_recording(self) -> None:
+        """Count a recording that could not be written."""
+        with self._lock:
+            self._recordings_lost += 1
 
     def track(self, error: NDArray[np.float64], progress: float | None) -> None:
         """Keep the largest tracking error (J,), and the progress of the trajectory."""
@@ -71,6 +76,7 @@ class SimulationStatistics:
                 "time_s": f"{time:.2f}",
                 "renderer": renderer,
                 "internal_errors": str(self._failures),
+                "recordings_lost": str(self._recordings_lost),
             }
             control = {
                 "progress": "none" if self._progress is None else f"{self._progress:.3f}",
@@ -84,7 +90,8 @@ class SimulationStatistics:
                 "last": self._last,
             }
             refused = self._last.startswith("refused")
+            failed = self._failures + self._recordings_lost > 0
         return [
-            make_status(f"{name}: simulation", self._failures > 0, "running", world),
+            make_status(f"{name}: simulation", failed, "running", world),
             make_status(f"{name}: trajectory", refused, self._last, control),
         ]

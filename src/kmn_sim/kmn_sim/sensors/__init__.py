@@ -1,4 +1,4 @@
-"""What sees the world: renderer, depth camera with its noise, and recordings of a run.
+"""What sees the world: depth camera with its noise, and recordings of a run.
 
-Imports ``world``; without ROS.
+Imports ``world`` and what that imports; without ROS.
 """

@@ -2,79 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.model.kinect_v1 import KinectV1
 
 NOISES = ("none", "kinect")
-
-
-class KinectSettings(NamedTuple):
-    """The sensor, see ``config/simulation/kinect.yaml``.
-
-    Attributes
-    ----------
-    disparity_scale, disparity_step
-        Disparity times depth, in pixels times metres, and the steps in which it comes.
-    axial
-        Standard deviation of the depth by its square, 1/m.
-    edge_step, jitter, loss
-        Disparity from which a step is an edge, standard deviation of the lateral noise there, both
-        in pixels, and probability that a pixel beside something nearer is lost.
-    projector, infrared
-        Distances of projector (to the right) and infrared camera (to the left) to the camera that
-        the image is of, metres.
-    filled
-        Pixels by which shadows are narrower than geometry has it.
-    """
-
-    disparity_scale: float
-    disparity_step: float
-    axial: float
-    edge_step: float
-    jitter: float
-    loss: float
-    projector: float
-    infrared: float
-    filled: float
-
-    @classmethod
-    def load(cls) -> KinectSettings:
-        """Read ``config/simulation/kinect.yaml``."""
-        section = Section.load(resources.find("config/simulation", "kinect"))
-        section.allow(("baseline", "focal_length", "disparity_step", "axial", "edge", "shadow"))
-        edge, shadow = section.section("edge"), section.section("shadow")
-        return cls(
-            disparity_scale=section.number("baseline", 0.0) * section.number("focal_length", 0.0),
-            disparity_step=section.number("disparity_step", 0.0),
-            axial=section.number("axial", 0.0),
-            edge_step=edge.number("step", 0.0),
-            jitter=edge.number("jitter", 0.0),
-            loss=edge.number("loss", 0.0),
-            projector=shadow.number("projector", 0.0),
-            infrared=shadow.number("infrared", 0.0),
-            filled=shadow.number("filled", 0.0),
-        )
 
 
 class Kinect:
     """A sensor with noise of its own.
 
+    Its lateral noise acts at edges only: on a surface matching averages.
+
     Parameters
     ----------
-    settings
+    sensor
         How it measures.
     seed
         Of the noise.
     """
 
-    def __init__(self, settings: KinectSettings, seed: int) -> None:
-        self._settings = settings
+    def __init__(self, sensor: KinectV1, seed: int) -> None:
+        self._sensor = sensor
         self._generator = np.random.default_rng(seed)
 
     def measure(self, depth: NDArray[np.float32], fx: float) -> NDArray[np.float32]:
@@ -92,13 +43,14 @@ class Kinect:
         depth
             The same with shadows, lost and frayed edges, axial noise and steps of the disparity.
         """
-        s = self._settings
-        seen = _jitter(depth, s.disparity_scale, s.edge_step, s.jitter, self._generator)
+        sensor, generator = self._sensor, self._generator
+        scale, edge, shadow = sensor.disparity.scale, sensor.edge, sensor.shadow
+        seen = _jitter(depth, scale, edge.step, sensor.lateral, generator)
         kept = seen.copy()
-        _cast_shadow(depth[:, ::-1], kept[:, ::-1], fx * s.projector, s.filled)
-        _cast_shadow(depth, kept, fx * s.infrared, s.filled)
-        _lose_edges(depth, kept, s.disparity_scale, s.edge_step, s.loss, self._generator)
-        return _quantise(kept, s.axial, s.disparity_scale, s.disparity_step, self._generator)
+        _cast_shadow(depth[:, ::-1], kept[:, ::-1], fx * shadow.projector, shadow.filled)
+        _cast_shadow(depth, kept, fx * shadow.infrared, shadow.filled)
+        _lose_edges(depth, kept, scale, edge.step, edge.loss, generator)
+        return _quantise(kept, sensor.axial.khoshelham, scale, sensor.disparity.step, generator)
 
 
 @njit(cache=True)

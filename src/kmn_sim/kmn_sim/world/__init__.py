@@ -1,4 +1,4 @@
-"""What stands in the world and how it moves: scenario, object, physics engine, and time.
+"""What stands in the world and how it moves: scenario, object, physics engine, renderer, and time.
 
-Imports ``robot``, ``control`` and, for pictures of the world, ``sensors.renderer``.
+Imports ``robot`` and ``control``.
 """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.rotation import quaternion_from_matrix
 from kmn_sim.world.cuboids import CARTON
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import BoxSettings
+from kmn_sim.world.settings import CartonSettings
 
 
 class Carton:
@@ -22,7 +22,7 @@ class Carton:
         Number of the body in the physics.
     """
 
-    def __init__(self, physics: Any, scenario: Scenario, settings: BoxSettings) -> None:
+    def __init__(self, physics: Any, scenario: Scenario, settings: CartonSettings) -> None:
         self._physics, self._scenario = physics, scenario
         cube = scenario.model.unit_cubes(scenario.theta, scenario.gamma)[0]
         size = np.linalg.norm(cube[:3, :3], axis=0)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import BoxSettings, DoorMechanics
+from kmn_sim.world.settings import DoorMechanics, FloorSettings, TableSettings
 
-FLOOR_SIZE, FLOOR_THICKNESS = 12.0, 0.1  # metres
-PANEL, HANDLE = (0.62, 0.46, 0.32, 1.0), (0.75, 0.75, 0.78, 1.0)  # colours
+# Colours, RGBA.
+PANEL, HANDLE = (0.62, 0.46, 0.32, 1.0), (0.75, 0.75, 0.78, 1.0)
 FRAME, WALL, FLOOR = (0.45, 0.33, 0.24, 1.0), (0.86, 0.86, 0.83, 1.0), (0.55, 0.57, 0.6, 1.0)
 TABLE, CARTON = (0.6, 0.52, 0.42, 1.0), (0.72, 0.55, 0.36, 1.0)
 
@@ -42,57 +42,34 @@ def door_cuboids(scenario: Scenario, settings: DoorMechanics) -> dict[str, list[
         for body in scenario.model.bodies
     }
     panel = links["panel"][0]
-    if scenario.stem:
-        links["handle"].append(_stem(scenario, panel, links["handle"][0], settings))
+    stem = scenario.model.stem
+    if scenario.stem and stem is not None:
+        links[stem.body.name].append(_cuboid(*stem.cuboid(gamma), HANDLE))
     links["world"] = []
+    frame, wall = settings.frame, settings.wall
     if scenario.frame:
-        links["world"] += _portal(panel, settings.gap, settings.frame, settings.frame, FRAME)
+        links["world"] += _portal(panel, frame.gap, frame.thickness, frame.thickness, FRAME)
     if scenario.wall:
-        inset = settings.gap + (settings.frame if scenario.frame else 0.0)
-        thickness = settings.wall_thickness
-        above = settings.wall_height - panel.size[2] - inset
-        links["world"] += _portal(panel, inset, settings.wall_width, thickness, WALL, above)
+        inset = frame.gap + (frame.thickness if scenario.frame else 0.0)
+        above = wall.height - panel.size[2] - inset
+        links["world"] += _portal(panel, inset, wall.width, wall.thickness, WALL, above)
     return links
 
 
-def floor_cuboid(scenario: Scenario, settings: BoxSettings) -> Cuboid:
-    """Return the floor, in the world frame."""
-    top = -settings.table_height if scenario.table else 0.0
-    centre = (0.0, 0.0, top - FLOOR_THICKNESS / 2.0)
-    return _cuboid(centre, (FLOOR_SIZE, FLOOR_SIZE, FLOOR_THICKNESS), FLOOR)
+def floor_cuboid(top: float, settings: FloorSettings) -> Cuboid:
+    """Return a floor whose surface has a height in the world frame, metres."""
+    centre = (0.0, 0.0, top - settings.thickness / 2.0)
+    return _cuboid(centre, (settings.size, settings.size, settings.thickness), FLOOR)
 
 
-def table_cuboids(settings: BoxSettings) -> list[Cuboid]:
+def table_cuboids(settings: TableSettings) -> list[Cuboid]:
     """Return a table's top and its foot, in the world frame."""
-    thickness, height = settings.table_thickness, settings.table_height
+    height, width, depth, thickness = settings
     foot = height - thickness
     return [
-        _cuboid(
-            (0.0, 0.0, -thickness / 2.0),
-            (settings.table_width, settings.table_depth, thickness),
-            TABLE,
-        ),
-        _cuboid(
-            (0.0, 0.0, -thickness - foot / 2.0),
-            (settings.table_width / 2.0, settings.table_depth / 2.0, foot),
-            TABLE,
-        ),
+        _cuboid((0.0, 0.0, -thickness / 2.0), (width, depth, thickness), TABLE),
+        _cuboid((0.0, 0.0, -thickness - foot / 2.0), (width / 2.0, depth / 2.0, foot), TABLE),
     ]
-
-
-def _stem(scenario: Scenario, panel: Cuboid, lever: Cuboid, settings: DoorMechanics) -> Cuboid:
-    """Return the stem, which fills the space between lever and panel at the lever's pivot."""
-    joint = next(joint for joint in scenario.model.joints if joint.body == "handle")
-    start = lever.centre[0] + lever.size[0] / 2.0
-    end = panel.centre[0] - panel.size[0] / 2.0
-    pivot = joint.origin(scenario.gamma)
-    y = np.clip(
-        pivot[1],
-        lever.centre[1] - (lever.size[1] - settings.stem) / 2.0,
-        lever.centre[1] + (lever.size[1] - settings.stem) / 2.0,
-    )
-    centre = ((start + end) / 2.0, y, pivot[2])
-    return _cuboid(centre, (end - start, settings.stem, settings.stem), HANDLE)
 
 
 def _portal(

@@ -16,7 +16,6 @@ from kmn_sim.world.scenario import Scenario
 from kmn_sim.world.settings import DoorMechanics
 
 PANEL_LINK, HANDLE_LINK = 0, 1  # the order of the model's joints
-PRELOAD_WIDTH = 0.01  # radians over which the spring's preload sets in
 
 
 class DoorState(NamedTuple):
@@ -42,7 +41,7 @@ class Door:
     def __init__(self, physics: Any, scenario: Scenario, settings: DoorMechanics) -> None:
         self._physics, self._settings = physics, settings
         hinge, handle = scenario.model.joints
-        opening = (0.0, settings.opening)
+        opening = (0.0, settings.hinge.opening)
         self._sign = -1.0 if scenario.direction == "pull" else 1.0
         limits = {
             hinge.name: opening if self._sign > 0.0 else (-opening[1], 0.0),
@@ -50,14 +49,14 @@ class Door:
         }
         self.joint_names = (hinge.name, handle.name)
         cuboids = door_cuboids(scenario, settings)
-        masses = {hinge.body: settings.panel_mass, handle.body: settings.handle_mass}
+        masses = {hinge.body: settings.panel.mass, handle.body: settings.handle.mass}
         urdf = door_urdf(scenario, cuboids, masses, limits)
         self.body = _load(physics, urdf, scenario.model.transformation.matrix(scenario.theta))
         physics.changeDynamics(
             self.body,
             HANDLE_LINK,
-            lateralFriction=settings.friction,
-            spinningFriction=settings.spinning_friction,
+            lateralFriction=settings.handle.friction,
+            spinningFriction=settings.handle.spinning_friction,
         )
         for link in (PANEL_LINK, HANDLE_LINK):  # the defaults damp what shall swing freely
             physics.changeDynamics(
@@ -74,14 +73,14 @@ class Door:
 
     def update(self) -> None:
         """Let latch and spring act in the next step of the physics."""
-        state, settings = self.state(), self._settings
-        caught = self.latched or abs(state.hinge) <= settings.catch
-        latched = caught and abs(state.handle) < settings.release
+        state, latch, handle = self.state(), self._settings.latch, self._settings.handle
+        caught = self.latched or abs(state.hinge) <= latch.catch
+        latched = caught and abs(state.handle) < latch.release
         if latched != self.latched:
             self._set_hinge(latched)
         self.latched = latched
-        torque = -settings.spring * state.handle - settings.damping * state.handle_velocity
-        torque -= settings.preload * np.clip(state.handle / PRELOAD_WIDTH, -1.0, 1.0)
+        torque = -handle.spring * state.handle - handle.damping * state.handle_velocity
+        torque -= handle.preload * np.clip(state.handle / handle.preload_width, -1.0, 1.0)
         self._physics.setJointMotorControl2(
             self.body, HANDLE_LINK, self._physics.TORQUE_CONTROL, force=torque
         )
@@ -89,14 +88,14 @@ class Door:
     def _set_hinge(self, latched: bool) -> None:
         """Hold the hinge where the door is closed, or let only its friction act."""
         if not latched:
-            self._release_motor(PANEL_LINK, self._settings.hinge_friction)
+            self._release_motor(PANEL_LINK, self._settings.hinge.friction)
             return
         self._physics.setJointMotorControl2(
             self.body,
             PANEL_LINK,
             self._physics.POSITION_CONTROL,
             targetPosition=0.0,
-            force=self._settings.latch_torque,
+            force=self._settings.latch.torque,
         )
 
     def _release_motor(self, link: int, friction: float) -> None:

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from kmn_sim.control.interpolation import State
 from kmn_sim.control.trajectory_controller import TrajectoryController
 from kmn_sim.robot.pr2_model import pr2_urdf
-from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.robot.simulated_robot import SimulatedRobot
-from kmn_sim.sensors.renderer import Renderer
 from kmn_sim.world.carton import Carton
 from kmn_sim.world.cuboids import Cuboid, door_cuboids, floor_cuboid, table_cuboids
 from kmn_sim.world.door import Door
 from kmn_sim.world.physics import Physics
+from kmn_sim.world.renderer import Renderer
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import BoxSettings, DoorMechanics, PhysicsSettings
+from kmn_sim.world.settings import WorldSettings
 
 
 class Simulation:
@@ -29,6 +28,8 @@ class Simulation:
     ----------
     scenario
         What stands in the world.
+    settings
+        Numbers of the world.
     gui
         Whether a window of the physics engine shows it.
     renderer
@@ -46,6 +47,8 @@ class Simulation:
         Client of the physics engine.
     renderer
         Renders what cameras see of the world.
+    settings
+        Numbers of the world.
     robot, controller, desired
         The robot, what it follows, and the state that is desired of it in the last step.
     floor
@@ -55,18 +58,17 @@ class Simulation:
     def __init__(
         self,
         scenario: Scenario,
+        settings: WorldSettings,
         gui: bool = False,
         renderer: str = "egl",
         from_desired_state: bool = True,
     ) -> None:
-        self._settings = PhysicsSettings.load()
-        self._door_settings, self._box_settings = DoorMechanics.load(), BoxSettings.load()
-        self._robot_settings, self._urdf = RobotSettings.load(), pr2_urdf()
+        self.settings, self._urdf = settings, pr2_urdf(settings.robot)
         self._from_desired_state = from_desired_state
         self.physics: Any = Physics(gui)
         # Before there are bodies: a renderer does not know of those that were there before it.
         self.renderer = Renderer(self.physics, renderer)
-        self.step_time = 1.0 / self._settings.rate
+        self.step_time = 1.0 / settings.physics.rate
         self._steps = 0
         self.build(scenario)
 
@@ -78,30 +80,28 @@ class Simulation:
     def build(self, scenario: Scenario) -> None:
         """Set up a scenario anew; robot and object stand where they start."""
         self.scenario = scenario
-        physics = self.physics
+        physics, settings = self.physics, self.settings
         physics.resetSimulation()
-        physics.setGravity(0.0, 0.0, -self._settings.gravity)
+        physics.setGravity(0.0, 0.0, -settings.physics.gravity)
         physics.setPhysicsEngineParameter(
             fixedTimeStep=self.step_time,
-            numSolverIterations=self._settings.solver_iterations,
+            numSolverIterations=settings.physics.solver_iterations,
             deterministicOverlappingPairs=1,
         )
         self.door: Door | None = None
         self.carton: Carton | None = None
         if scenario.is_door:
-            self.door = Door(physics, scenario, self._door_settings)
-            base = self._door_settings.robot
+            self.door, start = Door(physics, scenario, settings.door), {}
         else:
-            self.carton = Carton(physics, scenario, self._box_settings)
-            base = self._box_settings.robot
-        if scenario.table:
-            self._stand(table_cuboids(self._box_settings))
-        self.floor = -self._box_settings.table_height if scenario.table else 0.0
+            self.carton = Carton(physics, scenario, settings.box.box)
+            start = dict(zip(settings.robot.base_names, settings.box.robot, strict=True))
+        self._stand(self._table())
+        self.floor = -settings.box.table.height if scenario.table else 0.0
         self.robot = SimulatedRobot(
-            physics, self._urdf, self._robot_settings, base, self.floor, self.step_time
+            physics, self._urdf, settings.robot, start, self.floor, self.step_time
         )
         if scenario.floor:
-            ground = self._stand([floor_cuboid(scenario, self._box_settings)])
+            ground = self._stand(self._ground())
             # The robot's base moves in a plane: its wheels do not touch the ground.
             for link in range(-1, physics.getNumJoints(self.robot.body)):
                 physics.setCollisionFilterPair(ground, self.robot.body, -1, link, 0)
@@ -137,12 +137,10 @@ class Simulation:
         cubes = list(scenario.model.unit_cubes(*scenario.model.split(self.values())))
         if scenario.is_door:
             pose = scenario.model.transformation.matrix(scenario.theta)
-            links = door_cuboids(scenario, self._door_settings)
+            links = door_cuboids(scenario, self.settings.door)
             parts = [*links["world"], *links["handle"][1:]]
             cubes += [part.unit_cube(pose) for part in parts]
-        around = table_cuboids(self._box_settings) if scenario.table else []
-        if scenario.floor:
-            around = [*around, floor_cuboid(scenario, self._box_settings)]
+        around = [*self._table(), *self._ground()]
         return np.array([*cubes, *(part.unit_cube(np.eye(4)) for part in around)])
 
     def close(self) -> None:
@@ -150,8 +148,15 @@ class Simulation:
         self.renderer.close()
         self.physics.disconnect()
 
+    def _table(self) -> list[Cuboid]:
+        return table_cuboids(self.settings.box.table) if self.scenario.table else []
+
+    def _ground(self) -> list[Cuboid]:
+        ground = floor_cuboid(self.floor, self.settings.physics.floor)
+        return [ground] if self.scenario.floor else []
+
     def _stand(self, cuboids: Sequence[Cuboid]) -> int:
-        """Put cuboids that do not move into the world."""
+        """Put cuboids that do not move into the world; return the last one's body."""
         physics, body = self.physics, -1
         for cuboid in cuboids:
             half = (cuboid.size / 2.0).tolist()

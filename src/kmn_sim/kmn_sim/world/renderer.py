@@ -14,7 +14,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
-from kmn_sim.sensors.clipping import nearest_depth
+from kmn_sim.world.clipping import nearest_depth
 
 RENDERERS = ("egl", "software")
 LIGHT = (-3.0, -2.0, 4.0)  # direction towards the light, for pictures

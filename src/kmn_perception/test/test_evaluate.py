@@ -21,12 +21,12 @@ from hypothesis import strategies as st
 
 from kmn_perception.configuration import resources
 from kmn_perception.evaluation.comparison import Measurement, Request
-from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.evaluate import evaluate, main
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.tally import Tally
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
+from kmn_perception.network.errors import absolute_errors
 from kmn_perception.network.paper_network import PaperNetwork
 from kmn_perception.training.samples import EVALUATION, sample
 

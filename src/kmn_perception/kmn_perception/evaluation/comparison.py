@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.evaluation.coverage import is_covered
-from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.information_limit import best_estimate
 from kmn_perception.evaluation.methods import (
     METHODS,
@@ -27,6 +26,7 @@ from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
+from kmn_perception.network.errors import absolute_errors
 from kmn_perception.network.weights import Weights
 from kmn_perception.training.samples import EVALUATION, sample
 from kmn_perception.training.settings import SensorSettings

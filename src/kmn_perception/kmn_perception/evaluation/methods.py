@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.evaluation.errors import values_by_step
 from kmn_perception.evaluation.networks import Networks
 from kmn_perception.evaluation.registration import (
     Aligner,
@@ -23,6 +22,7 @@ from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.network.errors import values_by_step
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.weights import Weights, WeightsError
 from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch

@@ -93,20 +93,11 @@ def test_another_design_is_trained_and_read_by_its_name(
         "retrain_epochs: 1\npatience: 0.0\nbatch: 32\nlearning_rate: 0.02\nseed: 1\n"
     )
     out = tmp_path / "w.safetensors"
-    train.train(
-        train.arguments(
-            [
-                "--model",
-                "box_a",
-                "--config",
-                str(settings),
-                "--network",
-                "centre",
-                "--out",
-                str(out),
-            ]
-        )
-    )
+    given = ["--model", "box_a", "--config", str(settings), "--out", str(out)]
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    train.train(train.arguments([*given, "--network", "centre"]))
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
     loaded = weights.load(out, BOX_A)
     assert isinstance(loaded.network, CentreNetwork)
     assert loaded.metadata["network"] == loaded.metadata["training"]["network"] == "centre"

@@ -111,7 +111,7 @@ def icp_identity(model: KinematicModel, networks: Networks, settings: Evaluation
     aligner = point_to_point(_prototype(model), settings.icp)
 
     def estimates(observation: Observation) -> Iterator[MethodEstimate]:
-        yield MethodEstimate(np.zeros(len(model.parameters)))
+        yield MethodEstimate(model.prototype)
         yield MethodEstimate(_values(model, aligner(observation.points, np.eye(4))))
 
     return Method(estimates, counted=1)
@@ -174,8 +174,7 @@ def _iterated(network: MorphNetwork, counted: int) -> Method:
 
 def _prototype(model: KinematicModel) -> NDArray[np.float32]:
     """Return the prototype's cloud, as the canonical camera sees it."""
-    cubes = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
-    return depth_to_cloud(render(cubes, model.camera), model.camera)
+    return depth_to_cloud(render(model.prototype_cubes, model.camera), model.camera)
 
 
 def _registered(model: KinematicModel, aligner: Aligner) -> Method:

@@ -1,4 +1,4 @@
-"""What no method could know: the parameters that the image of an observation leaves open."""
+"""What no method could know: the parameters that the image of an observation does not show."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kmn_perception.model.rendering import render
 
 SAME_DEPTH = 1e-5  # metres; above the rounding of single precision
 PRECISION = 1e-3  # of the interval that the limits leave along a direction
-PASSES = 2  # the middle along one open direction can shift that along another
+PASSES = 2  # the middle along one unobservable direction can shift that along another
 
 
 def best_estimate(
@@ -20,9 +20,9 @@ def best_estimate(
 ) -> NDArray[np.float64]:
     """Return the middle (n + m,) of all parameters that look the same as the truth.
 
-    This is the best that can be done: of all that looks the same, within the limits, its expected
-    absolute error is least. What is hidden from an exact and complete depth image counts: beyond
-    its border, or behind other parts. What holes and noise hide does not.
+    This is the best that can be done: within the limits, no other estimate of what looks the same
+    has a smaller expected absolute error. Hidden is what an exact and complete depth image does not
+    show, beyond its border or behind other parts, but not what holes and noise hide.
     """
     image = render(model.unit_cubes(*model.split(truth)), camera)
     directions = null_directions(model, camera, truth, image)
@@ -45,11 +45,11 @@ def _reach(
     low, high = model.limits.T
     moving = direction != 0.0
     ahead = np.where(direction > 0.0, high, low)
-    most = float(((ahead - start)[moving] / direction[moving]).min())
-    good, bad = 0.0, most
-    if _same(image, render(model.unit_cubes(*model.split(start + most * direction)), camera)):
-        return most
-    while bad - good > PRECISION * most:
+    farthest = float(((ahead - start)[moving] / direction[moving]).min())
+    good, bad = 0.0, farthest
+    if _same(image, render(model.unit_cubes(*model.split(start + farthest * direction)), camera)):
+        return farthest
+    while bad - good > PRECISION * farthest:
         middle = (good + bad) / 2.0
         values = start + middle * direction
         if _same(image, render(model.unit_cubes(*model.split(values)), camera)):

@@ -126,7 +126,7 @@ def generalised_icp(
     model: KinematicModel, networks: Networks, settings: EvaluationSettings
 ) -> Method:
     """Return generalised ICP, from where the clouds' centres meet."""
-    return _registered(model, gicp(_prototype(model), settings.gicp))
+    return _registered(model, gicp(_prototype(model), settings.small_gicp))
 
 
 METHODS: dict[str, Factory] = {

@@ -118,13 +118,13 @@ def _see(camera_to_cubes: NDArray[np.float64], camera: Camera, covered: NDArray[
     return Seen(face // 6, face % 6 // 2, face % 2 - 0.5, rays, shown)
 
 
-def _thin(rows: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Keep up to ``most`` rows, evenly spread, of those that share their first two columns."""
+def _thin(rows: NDArray[np.float64], limit: int) -> NDArray[np.float64]:
+    """Keep up to ``limit`` rows, evenly spread, of those that share their first two columns."""
     kind = 8 * rows[:, 0] + rows[:, 1]
     kept = []
     for number in np.unique(kind):
         same = np.flatnonzero(kind == number)
-        kept.append(same[np.unique(np.linspace(0, len(same) - 1, most).astype(int))])
+        kept.append(same[np.unique(np.linspace(0, len(same) - 1, limit).astype(int))])
     return rows[np.concatenate(kept)] if kept else rows
 
 
@@ -175,8 +175,8 @@ def _cast(
 
 
 @njit(cache=True)
-def _spread(faces: NDArray[np.int64], count: int, most: int) -> NDArray[np.float64]:
-    """Return up to ``most`` pixels of each face, evenly spread: face, 2 ``DEPTH``, u, v."""
+def _spread(faces: NDArray[np.int64], count: int, limit: int) -> NDArray[np.float64]:
+    """Return up to ``limit`` pixels of each face, evenly spread: face, 2 ``DEPTH``, u, v."""
     height, width = faces.shape
     pixels = np.zeros(count, dtype=np.int64)
     for face in faces.flat:
@@ -188,7 +188,7 @@ def _spread(faces: NDArray[np.int64], count: int, most: int) -> NDArray[np.float
         for u in range(width):
             face = faces[v, u]
             if face != EMPTY:
-                if seen[face] * most // pixels[face] != (seen[face] - 1) * most // pixels[face]:
+                if seen[face] * limit // pixels[face] != (seen[face] - 1) * limit // pixels[face]:
                     found.append((float(face), 2.0 * DEPTH, float(u), float(v)))
                 seen[face] += 1
     return np.array(found)

@@ -97,7 +97,7 @@ def render_window(
     observation: Observation,
     values: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Render the observation, morphed by the estimated parameters, anew in a window.
+    """Render the observation, morphed by the estimated parameters, in a window.
 
     The points are morphed such that the window's body, if the estimate is right, comes to lie on
     that of the prototype: the paper's T_theta^-1 (Eq. 5), and the like for gamma.

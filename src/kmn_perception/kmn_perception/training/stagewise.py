@@ -131,8 +131,8 @@ class StagewiseTraining(Training):
     def loss(self, outputs: Tensor, values: Tensor) -> Tensor:
         """Return the absolute error, rounded off near 0, in units of what is to be predicted.
 
-        The mean absolute error is what the paper measures; it is least at the median of what a view
-        leaves open. As for the paper's network, the parameters are weighted by the root of their
+        The mean absolute error is what the paper measures; the median of what a view leaves unknown
+        minimises it. As for the paper's network, the parameters are weighted by the root of their
         size.
         """
         stage = self.fitted()

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from kmn_perception.configuration.output import replacing
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.model.transformation import transform_points
@@ -83,7 +84,8 @@ def save_picture(path: Path, overlay: Overlay) -> None:
     """Write one overlay as a picture."""
     figure = Figure(figsize=(8, 6.4), dpi=120, layout="constrained")
     _draw(figure.subplots(), overlay, line_width=2.5, font_size=13)
-    figure.savefig(path)
+    with replacing(path) as new:
+        figure.savefig(new)
 
 
 def save_pictures(overlays: Iterable[Overlay], count: int, folder: Path) -> Path:
@@ -104,7 +106,8 @@ def save_contact_sheet(path: Path, overlays: Sequence[Overlay]) -> None:
         axes.set_axis_off()
     for axes, overlay in zip(figure.axes, overlays, strict=False):
         _draw(axes, overlay, line_width=1.5, font_size=9)
-    figure.savefig(path)
+    with replacing(path) as new:
+        figure.savefig(new)
 
 
 def _draw(axes: Axes, overlay: Overlay, line_width: float, font_size: float) -> None:

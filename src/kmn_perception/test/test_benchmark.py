@@ -23,7 +23,8 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
 from kmn_perception.model.transformation import transform_points
 from kmn_perception.network import weights
-from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.cascade import Cascade
+from kmn_perception.network.cascade_settings import CascadeSettings
 from kmn_perception.ros.messages import points_from_cloud
 
 COMMAND = [sys.executable, "-c", "from kmn_perception.benchmark import main; main()"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -15,10 +16,12 @@ from numpy.typing import NDArray
 
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.experiments.baselines import BASELINES
-from kmn_perception.experiments.labelled_frame import FrameError, read_frames
+from kmn_perception.experiments.labelled_frame import FrameError, check_frames, read_frames
+from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.experiments.upright_box import UprightBox, errors, intersection_over_union
 
 SHIPPED = share_directory() / "data" / "kinect_boxes"
+SETTINGS = ExperimentSettings.load()
 KEYS = (
     "frames", "objects", "found", "false_found", "yaw_error_deg", "size_error_m",
     "centre_error_m", "iou", "coverage95", "milliseconds", "baselines",
@@ -40,7 +43,7 @@ def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_it_writes_figures_and_pictures_with_the_baselines_beside(tmp_path: Path) -> None:
+def test_it_writes_statistics_and_pictures_with_the_baselines_beside(tmp_path: Path) -> None:
     frames, out = tmp_path / "frames", tmp_path / "pictures"
     frames.mkdir()
     done = _evaluate(_copy(frames, 2, 14), "--json", tmp_path / "e.json", "--out", out)
@@ -97,7 +100,34 @@ def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None
         read_frames(tmp_path)
     cv2.imwrite(str(tmp_path / "learn3_l.png"), np.zeros((480, 640), dtype=np.uint8))
     with pytest.raises(FrameError, match="0 measured pixels are labelled 1, expected a table"):
-        read_frames(tmp_path)
+        check_frames(read_frames(tmp_path), SETTINGS)
+
+
+def test_frames_of_another_size_are_refused_with_both_sizes(tmp_path: Path) -> None:
+    _copy(tmp_path, 3)
+    for kind in "dl":
+        file = str(tmp_path / f"learn3_{kind}.png")
+        picture = cv2.imread(file, cv2.IMREAD_UNCHANGED)
+        assert picture is not None
+        cv2.imwrite(file, picture[::2, ::2])
+    done = _evaluate(tmp_path)
+    assert done.returncode == 1
+    expected = "evaluate_frames: learn3: 320 x 240 pixels, expected the 640 x 480 of the experiment"
+    assert done.stderr.splitlines()[-1].startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("option", "path", "message"),
+    [
+        ("--json", ".", "argument --json: . is not a file in a folder that exists"),
+        ("--out", "/proc/pictures", "argument --out: nothing can be written to /proc"),
+        ("--out", str(SHIPPED / "learn3_d.png"), "argument --out: .*is a file"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_at_once(option: str, path: str, message: str) -> None:
+    done = _evaluate(option, path)
+    assert done.returncode == 2
+    assert re.search(message, done.stderr)
 
 
 def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
@@ -118,7 +148,7 @@ def _surface(box: UprightBox) -> NDArray[np.float32]:
 @pytest.mark.parametrize("name", list(BASELINES))
 def test_baselines_find_a_box_that_is_seen_from_all_sides(name: str) -> None:
     box = UprightBox(np.array([0.1, -0.2, 0.1]), np.array([0.3, 0.15, 0.2]), 0.4)
-    found = BASELINES[name](_surface(box))
+    found = BASELINES[name](_surface(box), SETTINGS.baselines)
     off = errors(found, box)
     assert np.degrees(off.yaw) < 0.5
     assert off.size.max() < 0.003

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
-from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.cascade import Cascade
+from kmn_perception.network.cascade_settings import CascadeSettings
 from kmn_perception.network.morph import predict, predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.paper_network import PaperNetwork

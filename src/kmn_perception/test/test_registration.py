@@ -58,7 +58,7 @@ def test_point_to_point_recovers_a_small_rigid_motion(
     ("aligner", "tolerance"),
     [
         (lambda target: point_to_plane(target, SETTINGS.icp), 1e-4),
-        (lambda target: gicp(target, SETTINGS.gicp), 5e-3),
+        (lambda target: gicp(target, SETTINGS.small_gicp), 5e-3),
     ],
 )
 def test_surfaces_are_moved_onto_themselves(

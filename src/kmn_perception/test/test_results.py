@@ -17,15 +17,15 @@ from kmn_perception.evaluation.results import main, result_of
 from kmn_perception.evaluation.settings import EvaluationSettings
 
 JSON_FILES = {"box_a_none.json", "box_a_mm.json", "box_a_kinect.json"}
-FIGURES = {"predictions.png", "samples_box_a.png", "training.png"}
+PLOTS = {"predictions.png", "samples_box_a.png", "training.png"}
 
 
 def test_the_page_shows_what_was_evaluated(tmp_path: Path) -> None:
     main(["--out", str(tmp_path), "--samples", "4", "--models", "box_a"])
-    assert {file.name for file in tmp_path.iterdir()} == JSON_FILES | FIGURES | {"README.md"}
+    assert {file.name for file in tmp_path.iterdir()} == JSON_FILES | PLOTS | {"README.md"}
     results = {name: json.loads((tmp_path / name).read_text()) for name in JSON_FILES}
     page = (tmp_path / "README.md").read_text()
-    assert set(re.findall(r"\]\((\w+\.png)\)", page)) == FIGURES
+    assert set(re.findall(r"\]\((\w+\.png)\)", page)) == PLOTS
     assert "`./run kmn_perception results --samples 4 --seed 0 --models box_a`" in page
     for name, result in results.items():
         assert result["noise"] == name.removesuffix(".json").split("_")[-1]
@@ -33,11 +33,11 @@ def test_the_page_shows_what_was_evaluated(tmp_path: Path) -> None:
     overview = page.split("## ")[1].splitlines()
     exact = results["box_a_none.json"]["methods"]["kmn_paper"]["mean"]
     assert any(f"| `kmn_paper` | {exact:.5f} (0.00142) |" in line for line in overview)
-    for figure in FIGURES:
-        image = cv2.imread(str(tmp_path / figure))
+    for plot in PLOTS:
+        image = cv2.imread(str(tmp_path / plot))
         assert image is not None and min(image.shape[:2]) > 200
         assert image.std() > 5.0
-        assert (tmp_path / figure).stat().st_size < 200_000
+        assert (tmp_path / plot).stat().st_size < 200_000
 
 
 def test_what_was_evaluated_is_taken_over_unless_something_has_changed(
@@ -59,9 +59,21 @@ def test_what_was_evaluated_is_taken_over_unless_something_has_changed(
     for key, other in (("weights", {"paper": "0" * 12}), ("configuration", "0" * 12)):
         file.write_text(json.dumps(json.loads(file.read_text()) | {key: other}))
         assert evaluated(Request("box_a", 1, "mm", methods=few), samples=3)
+    file.write_text(file.read_text()[:100])
+    assert evaluated(Request("box_a", 1, "mm", methods=few), samples=3)
 
 
-def test_asmoothed_power_law_is_the_same_and_a_peak_is_spread() -> None:
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    for path, message in (("/proc/results", "nothing can be"), (tmp_path / "file", "is a file")):
+        with pytest.raises(SystemExit):
+            main(["--out", str(path)])
+        assert message in capsys.readouterr().err
+
+
+def test_a_smoothed_power_law_is_the_same_and_a_peak_is_spread() -> None:
     """Means are of logarithms, of which an exponential has a straight line."""
     falling = np.exp(-np.linspace(0.0, 3.0, 60))
     np.testing.assert_allclose(smooth(falling)[4:-4], falling[4:-4])

@@ -7,8 +7,9 @@ import pytest
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.surface_distance import surface_distances
+from kmn_perception.training.procedures import load_training_settings
 from kmn_perception.training.samples import sample
-from kmn_perception.training.settings import SensorSettings, TrainingSettings
+from kmn_perception.training.settings import SensorSettings
 
 BOX = KinematicModel.load("box")
 
@@ -16,7 +17,7 @@ BOX = KinematicModel.load("box")
 @pytest.fixture
 def exact() -> SensorSettings:
     """Return the shipped sensor without anything that it gets wrong."""
-    sensor = TrainingSettings.load("box").sensor
+    sensor = load_training_settings("box").sensor
     assert sensor is not None
     return replace(
         sensor, noise="none", holes=0.0, pose_error=(0.0, 0.0), occlusion=0.0, cut_height=0.0
@@ -72,7 +73,7 @@ def test_points_near_the_floor_are_lost(exact: SensorSettings) -> None:
 
 @pytest.mark.parametrize("name", ["robust/door", "box"])
 def test_robust_settings_train_with_all_that_sensors_get_wrong(name: str) -> None:
-    sensor = TrainingSettings.load(name).sensor
+    sensor = load_training_settings(name).sensor
     assert sensor is not None
     assert sensor.noise == "kinect"
     assert min(sensor.holes, sensor.occlusion, *sensor.pose_error) > 0.0

@@ -38,6 +38,7 @@ class Settings:
     levels: tuple[Level, ...]
     by_name: dict[str, Level]
     optional: Count = 3
+    absent: Level | None = None
 
 
 GOOD: dict[str, Any] = {
@@ -76,6 +77,7 @@ def test_lists_become_tuples_and_whole_numbers_real_ones(tmp_path: Path) -> None
         ({"levels": 1}, "mine.yaml: 'levels' must be a list, found 1"),
         ({"by_name": {"a": {"steps": -1}}}, "mine.yaml: by_name: a: 'steps' must be greater"),
         ({"by_name": {"a": {"b": 1}}}, "mine.yaml: by_name: a: unknown key 'b' (known: steps)"),
+        ({"absent": {"step": 1}}, "mine.yaml: absent: unknown key 'step' (known: steps)"),
         ({"other": 1}, "mine.yaml: unknown key 'other' (known: share, limits, edge, levels"),
     ],
 )

@@ -69,6 +69,47 @@ def test_table_before_floor_and_wall_is_the_support() -> None:
     assert plane.height == pytest.approx(0.8, abs=1e-4)
 
 
+SMALL_TABLE = cuboid((1.2, 0.7, 0.03), (0.0, 0.0, -0.015))
+OVER_THE_TABLE = look_at((0.0, -1.3, 0.9), (0.0, -0.6, 0.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_the_table_is_the_support_though_more_of_the_floor_is_in_view(noise: float) -> None:
+    """At a table's edge, with a box on the table and a case on the floor."""
+    case = cuboid((0.4, 0.3, 0.3), (0.5, -0.8, -0.55))
+    points = view(SMALL_TABLE, BOX, FLOOR, case, pose=OVER_THE_TABLE)
+    points += np.random.default_rng(1).normal(0.0, noise, points.shape).astype(np.float32)
+    above = points @ OVER_THE_TABLE[:3, :3].T[:, 2] + OVER_THE_TABLE[2, 3]
+    on_table, on_floor = (np.abs(above - z) < 0.01 for z in (0.0, -0.7))
+    assert on_floor.sum() > 3 * on_table.sum()
+    plane = find_support_plane(points, SETTINGS)
+    assert plane is not None
+    assert plane.height == pytest.approx(0.9, abs=4e-3)
+
+
+def test_without_anything_on_the_table_the_larger_floor_is_the_support() -> None:
+    plane = find_support_plane(view(SMALL_TABLE, FLOOR, pose=OVER_THE_TABLE), SETTINGS)
+    assert plane is not None
+    assert plane.height == pytest.approx(1.6, abs=1e-3)
+
+
+def test_the_top_of_a_box_is_no_support_even_with_a_box_upon_it() -> None:
+    lower = cuboid((0.6, 0.5, 0.25), (0.0, 0.0, 0.125))
+    upper = cuboid((0.2, 0.2, 0.15), (0.0, 0.0, 0.325))
+    pose = look_at((0.0, -0.9, 1.0), (0.0, 0.0, 0.1))
+    plane = find_support_plane(view(TABLE, lower, upper, pose=pose), SETTINGS)
+    assert plane is not None
+    assert plane.height == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_wall_behind_the_floor_is_no_level_surface() -> None:
+    pose = look_at((0.0, -2.5, 0.9), (0.0, 1.5, 0.2))
+    case = cuboid((0.5, 0.4, 0.45), (0.3, 0.4, -0.475))
+    plane = find_support_plane(view(FLOOR, WALL, case, pose=pose), SETTINGS)
+    assert plane is not None
+    assert plane.height == pytest.approx(1.6, abs=5e-3)
+
+
 def test_neither_wall_nor_side_of_a_box_is_a_support() -> None:
     pose = look_at((0.0, -1.0, 0.8), (0.0, 0.0, 0.6))
     assert find_support_plane(view(WALL, pose=pose), SETTINGS) is None

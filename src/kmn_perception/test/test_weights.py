@@ -10,7 +10,8 @@ from safetensors.torch import load_file, save_file
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
-from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.cascade import Cascade
+from kmn_perception.network.cascade_settings import CascadeSettings
 from kmn_perception.network.paper_network import PaperNetwork
 
 DOOR = KinematicModel.load("door")
@@ -54,12 +55,13 @@ def test_a_cascade_comes_back_with_the_same_predictions(tmp_path: Path) -> None:
 def test_a_design_that_is_none_of_ours_is_refused(tmp_path: Path, file: Path) -> None:
     metadata = {
         **weights.describe(DOOR),
-        "design": {"cascade": {"margins": []}, "stages": 1},
+        "network": "cascade",
+        "design": {"settings": {"margins": []}, "stages": 1},
         "format": weights.FORMAT,
     }
     text = {key: json.dumps(value) for key, value in metadata.items()}
     save_file(load_file(str(file)), str(file), text)
-    with pytest.raises(weights.WeightsError, match="describes no network of ours"):
+    with pytest.raises(weights.WeightsError, match="describes no network for 'door'"):
         weights.load(file, DOOR)
 
 
@@ -90,7 +92,9 @@ def test_a_foreign_safetensors_file_is_refused(file: Path) -> None:
 
 def test_a_file_with_other_tensors_than_it_says_is_refused(file: Path) -> None:
     design = {"channels": [2, 2, 2, 2, 2], "input": vars(DOOR.input)}
-    metadata = {**weights.describe(DOOR), "design": design, "format": weights.FORMAT}
+    metadata = {
+        **weights.describe(DOOR), "network": "paper", "design": design, "format": weights.FORMAT,
+    }  # fmt: skip
     text = {key: json.dumps(value) for key, value in metadata.items()}
     save_file(load_file(str(file)), str(file), text)
     with pytest.raises(weights.WeightsError, match="does not hold the network that it describes"):

@@ -12,7 +12,7 @@ from kmn_perception.model.camera import look_at
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
-from kmn_perception.network.cascade import CascadeSettings
+from kmn_perception.network.cascade_settings import CascadeSettings
 from kmn_perception.network.windows import Window, morph_of_body, render_window
 
 SETTINGS = CascadeSettings.load().window

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
@@ -19,6 +18,7 @@ from kmn_perception.bags.replay import positive_number
 from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.depth_image import read_depth_image
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 
@@ -36,16 +36,7 @@ def load_frames() -> list[NDArray[np.float32]]:
     """Return the shipped depth images (height, width), metres, NaN where nothing was measured."""
     files = (share_directory() / "data" / "kinect_boxes").glob("learn*_d.png")
     in_order = sorted(files, key=lambda file: int(file.stem[len("learn") : -len("_d")]))
-    return [_read_depth(file) for file in in_order]
-
-
-def _read_depth(file: Path) -> NDArray[np.float32]:
-    millimetres = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-    if millimetres is None:
-        raise OSError(f"{file} is not a picture")
-    metres = millimetres.astype(np.float32) / np.float32(1e3)
-    metres[millimetres == 0] = np.nan
-    return metres
+    return [read_depth_image(file) for file in in_order]
 
 
 def make_example_bag(bag: Path, rate: float, storage: str = "mcap") -> None:

@@ -1,4 +1,4 @@
 """What the programs of all packages share: types of arguments, tables in columns, the launcher.
 
-Imports nothing of this package; programs import it.
+Imports ``configuration``; programs import it.
 """

@@ -79,6 +79,7 @@ def _problems(
 ) -> Iterator[str]:
     """Yield what types do not tell: keys that the schema lacks, and numbers that are not finite."""
     definitions = schema.get("$defs", {}) if definitions is None else definitions
+    schema = next((option for option in schema.get("anyOf", ()) if "$ref" in option), schema)
     schema = definitions.get(schema.get("$ref", "").rpartition("/")[2], schema)
     if isinstance(values, float) and not math.isfinite(values):
         yield f"{place}: must be finite, found {values}"

@@ -1,4 +1,4 @@
-"""What is measured on each sample; built anew in each process that measures."""
+"""What is measured on each sample, by each of the processes that measure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.evaluation.coverage import is_covered
-from kmn_perception.evaluation.errors import absolute_errors
 from kmn_perception.evaluation.information_limit import best_estimate
 from kmn_perception.evaluation.methods import (
     METHODS,
@@ -27,6 +26,7 @@ from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
+from kmn_perception.network.errors import absolute_errors
 from kmn_perception.network.weights import Weights
 from kmn_perception.training.samples import EVALUATION, sample
 from kmn_perception.training.settings import SensorSettings
@@ -154,9 +154,9 @@ class Comparison:
 def sensor_of(networks: Networks, noise: str | None) -> tuple[SensorSettings | None, str]:
     """Return the sensor from which samples are seen, and its noise.
 
-    It is that of which the paper's network was trained, else ours, with the noise that is given.
-    Where these were trained with the canonical camera or there are none, it is this. The camera's
-    pose is known here: what it is wrong by, no method could tell.
+    It is the one that the paper's network was trained for, else ours, with the noise that is given.
+    Where these were trained for the canonical camera, or where there are none, it is that camera.
+    Its pose is known here: no method could tell the error of its calibration.
     """
     loaded = [weights for weights in networks[:2] if isinstance(weights, Weights)]
     trained = loaded[0].metadata.get("training", {}).get("sensor") if loaded else None

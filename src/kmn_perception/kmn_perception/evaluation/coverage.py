@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -43,19 +43,27 @@ def is_covered(
 
 @cache
 def chi2_quantile(probability: float, degrees: int) -> float:
-    """Return the quantile of the chi-square distribution, by bisection of the incomplete gamma."""
-    shape = torch.tensor(degrees / 2.0, dtype=torch.float64)
+    """Return the quantile of the chi-square distribution, by bisection."""
     low, high = 0.0, 1.0
-    while _chi2_probability(shape, high) < probability:
+    while _chi2_probability(high, degrees) < probability:
         high *= 2.0
     while low < (middle := (low + high) / 2.0) < high:
-        if _chi2_probability(shape, middle) < probability:
+        if _chi2_probability(middle, degrees) < probability:
             low = middle
         else:
             high = middle
     return high
 
 
-def _chi2_probability(shape: torch.Tensor, value: float) -> float:
-    half = torch.tensor(value / 2.0, dtype=torch.float64)
-    return float(torch.special.gammainc(shape, half))
+def _chi2_probability(value: float, degrees: int) -> float:
+    """Return P(degrees / 2, value / 2), the regularised lower incomplete gamma function.
+
+    P(1/2, x) = erf(sqrt(x)), P(1, x) = 1 - exp(-x), and P(a + 1, x) = P(a, x) - x^a exp(-x) /
+    Gamma(a + 1) (DLMF 7.11.1, 8.4.5, 8.8.5).
+    """
+    x, odd = value / 2.0, degrees % 2 == 1
+    a, probability = (0.5, math.erf(math.sqrt(x))) if odd else (1.0, -math.expm1(-x))
+    while a < degrees / 2.0:
+        probability -= math.exp(a * math.log(x) - x - math.lgamma(a + 1.0))
+        a += 1.0
+    return probability

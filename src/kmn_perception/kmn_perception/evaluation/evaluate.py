@@ -46,7 +46,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
 def evaluate(
     request: Request, samples: int, jobs: int, settings: EvaluationSettings
 ) -> dict[str, Any]:
-    """Return the figures of all methods on samples that never trained, as written to JSON."""
+    """Return the statistics of all methods on samples of their own, as written to JSON."""
     comparison = Comparison(request, settings)
     for name, reason in comparison.left_out.items():
         print(f"{name} is left out: {reason}", file=sys.stderr)

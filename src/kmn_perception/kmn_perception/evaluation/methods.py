@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.evaluation.errors import values_by_step
 from kmn_perception.evaluation.networks import Networks
 from kmn_perception.evaluation.registration import (
     Aligner,
@@ -23,6 +22,7 @@ from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
+from kmn_perception.network.errors import values_by_step
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.weights import Weights, WeightsError
 from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch
@@ -111,7 +111,7 @@ def icp_identity(model: KinematicModel, networks: Networks, settings: Evaluation
     aligner = point_to_point(_prototype(model), settings.icp)
 
     def estimates(observation: Observation) -> Iterator[MethodEstimate]:
-        yield MethodEstimate(np.zeros(len(model.parameters)))
+        yield MethodEstimate(model.prototype)
         yield MethodEstimate(_values(model, aligner(observation.points, np.eye(4))))
 
     return Method(estimates, counted=1)
@@ -126,7 +126,7 @@ def generalised_icp(
     model: KinematicModel, networks: Networks, settings: EvaluationSettings
 ) -> Method:
     """Return generalised ICP, from where the clouds' centres meet."""
-    return _registered(model, gicp(_prototype(model), settings.gicp))
+    return _registered(model, gicp(_prototype(model), settings.small_gicp))
 
 
 METHODS: dict[str, Factory] = {
@@ -174,8 +174,7 @@ def _iterated(network: MorphNetwork, counted: int) -> Method:
 
 def _prototype(model: KinematicModel) -> NDArray[np.float32]:
     """Return the prototype's cloud, as the canonical camera sees it."""
-    cubes = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
-    return depth_to_cloud(render(cubes, model.camera), model.camera)
+    return depth_to_cloud(render(model.prototype_cubes, model.camera), model.camera)
 
 
 def _registered(model: KinematicModel, aligner: Aligner) -> Method:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kmn_perception.evaluation.settings import PaperFigures
+from kmn_perception.evaluation.settings import PaperErrors
 from kmn_perception.evaluation.table import (
     NONE,
     PAPER_METHOD,
@@ -40,8 +40,8 @@ method's own covariance.
 """
 
 
-def samples_figure(model: str) -> str:
-    """Return the name of the figure of a model's best and worst samples."""
+def samples_plot(model: str) -> str:
+    """Return the name of the plot of a model's best and worst samples."""
     return f"samples_{model}.png"
 
 
@@ -52,7 +52,7 @@ def shown_method(result: Mapping[str, Any]) -> str | None:
 
 def page(
     results: Mapping[str, Mapping[str, dict[str, Any]]],
-    paper: Mapping[str, PaperFigures],
+    paper: Mapping[str, PaperErrors],
     command: str,
 ) -> str:
     """Return the page.
@@ -62,7 +62,7 @@ def page(
     results
         By noise (``none`` and others) and model, as written to JSON.
     paper
-        The paper's figures, by model.
+        The errors that the paper reports, by model.
     command
         Makes the page again.
     """
@@ -109,25 +109,25 @@ def _origin(results: Mapping[str, Mapping[str, dict[str, Any]]], command: str) -
     return (
         f"Written by `{command}` (as by `make evaluate`) on {last[:10]}; "
         f"{every[0]['samples']} samples, seed {every[0]['seed']}. The JSON files beside this page "
-        "hold all figures, and the command that yields them."
+        "hold all statistics, and the command that yields them."
     )
 
 
-def _overview(exact: Mapping[str, dict[str, Any]], paper: Mapping[str, PaperFigures]) -> Rows:
+def _overview(exact: Mapping[str, dict[str, Any]], paper: Mapping[str, PaperErrors]) -> Rows:
     names = dict.fromkeys(name for result in exact.values() for name in result["methods"])
     rows = [["method", *exact]]
     for name in names:
         row = [f"`{name}`"]
         for model, result in exact.items():
             method = result["methods"].get(name)
-            figure = paper.get(model, {}).get(PAPER_METHOD.get(name, ""), {}).get("mean")
-            beside = "" if figure is None else f" ({figure:.5f})"
+            reported = paper.get(model, {}).get(PAPER_METHOD.get(name, ""), {}).get("mean")
+            beside = "" if reported is None else f" ({reported:.5f})"
             row.append(NONE if method is None else error(method["mean"]) + beside)
         rows.append(row)
     return rows
 
 
-def _scene(model: str, result: dict[str, Any], paper: PaperFigures) -> list[str]:
+def _scene(model: str, result: dict[str, Any], paper: PaperErrors) -> list[str]:
     parts = [
         f"## {model}",
         markdown(summary(result, paper)),
@@ -138,7 +138,7 @@ def _scene(model: str, result: dict[str, Any], paper: PaperFigures) -> list[str]
     ]
     if shown_method(result):
         parts += [
-            f"![Best and worst samples, before and after morphing]({samples_figure(model)})",
+            f"![Best and worst samples, before and after morphing]({samples_plot(model)})",
             "What the canonical camera sees of the points, above as observed, with the prototype's "
             "contour, and below morphed by the estimate, with the contour at the estimated gamma.",
         ]

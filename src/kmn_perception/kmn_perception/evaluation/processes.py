@@ -7,10 +7,9 @@ import multiprocessing
 import signal
 from collections.abc import Iterator
 
-import torch
-
 from kmn_perception.evaluation.comparison import Comparison, Measurement, Request
 from kmn_perception.evaluation.settings import EvaluationSettings
+from kmn_perception.network.threads import use_one_thread
 
 MIN_SAMPLES = 50  # of a process; for fewer its start, some seconds, does not pay
 
@@ -25,7 +24,7 @@ def measurements(
     """Yield what ``comparison`` measures on samples 0, 1, 2, ..., in this order."""
     count = min(jobs, math.ceil(samples / MIN_SAMPLES))
     if count == 1:
-        torch.set_num_threads(1)
+        use_one_thread()
         yield from map(comparison, range(samples))
         return
     context = multiprocessing.get_context("spawn")
@@ -36,7 +35,7 @@ def measurements(
 def _start(request: Request, settings: EvaluationSettings) -> None:
     global _comparison
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
-    torch.set_num_threads(1)
+    use_one_thread()
     _comparison = Comparison(request, settings)
 
 

@@ -59,9 +59,9 @@ def gicp(target: NDArray[np.float32], settings: GicpSettings) -> Aligner:
     return align
 
 
-def draw(points: NDArray[np.float32], most: int) -> NDArray[np.float32]:
-    """Return up to ``most`` of the points (N, 3), always the same."""
-    count = min(len(points), most)
+def draw(points: NDArray[np.float32], limit: int) -> NDArray[np.float32]:
+    """Return up to ``limit`` of the points (N, 3), always the same."""
+    count = min(len(points), limit)
     return points[np.random.default_rng(0).choice(len(points), count, replace=False)]
 
 

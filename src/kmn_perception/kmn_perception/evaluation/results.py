@@ -1,4 +1,4 @@
-"""The ``results`` executable: the paper's table and figures, with ours, as a page of the docs."""
+"""The ``results`` executable: the paper's table and plots, with ours, as a page of docs/."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from kmn_perception.command_line.arguments import whole_number, write_json
+from kmn_perception.command_line.arguments import output_folder, whole_number, write_json
+from kmn_perception.configuration.output import replacing
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.comparison import LIMIT, Comparison, Request
 from kmn_perception.evaluation.evaluate import command, configuration_hash, evaluate
@@ -23,7 +24,7 @@ from kmn_perception.evaluation.page import (
     PREDICTIONS,
     TRAINING,
     page,
-    samples_figure,
+    samples_plot,
     shown_method,
 )
 from kmn_perception.evaluation.plots.predictions import draw_predictions
@@ -47,7 +48,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--samples", type=whole_number(1), default=2000, help="default 2000")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of samples (default 0)")
     parser.add_argument(
-        "--out", type=Path, default=Path("docs/results"), help="default docs/results"
+        "--out", type=output_folder, default=Path("docs/results"), help="default docs/results"
     )
     parser.add_argument("--models", nargs="+", default=MODELS, choices=MODELS, help="default: all")
     parser.add_argument("--anew", action="store_true", help="do not take over earlier results")
@@ -68,13 +69,22 @@ def result_of(
         "configuration": configuration_hash(request.model),
     }
     if file.is_file() and not anew:
-        earlier: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        earlier = _read(file)
         if {key: earlier.get(key) for key in expected} == expected:
             print(f"{file}: taken over, nothing has changed", file=sys.stderr)
             return earlier
     result = evaluate(request, samples, jobs, settings)
     write_json(file, result)
     return result
+
+
+def _read(file: Path) -> dict[str, Any]:
+    """Return what an evaluation wrote; nothing if that is damaged."""
+    try:
+        result = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError:
+        result = None
+    return result if isinstance(result, dict) else {}
 
 
 def draw_extremes(result: dict[str, Any], settings: EvaluationSettings, file: Path) -> None:
@@ -105,7 +115,7 @@ def draw_losses(models: Sequence[str], file: Path) -> None:
 
 
 def regenerate(options: argparse.Namespace) -> None:
-    """Evaluate what is not evaluated yet, and write the page with its figures."""
+    """Evaluate what is not evaluated yet, and write the page with its plots."""
     settings, folder = EvaluationSettings.load(), options.out
     folder.mkdir(parents=True, exist_ok=True)
     results: Results = {noise: {} for noise in NOISES}
@@ -121,12 +131,13 @@ def regenerate(options: argparse.Namespace) -> None:
     draw_losses(options.models, folder / TRAINING)
     draw_predictions(list(exact.values()), folder / PREDICTIONS)
     for model, result in exact.items():
-        draw_extremes(result, settings, folder / samples_figure(model))
+        draw_extremes(result, settings, folder / samples_plot(model))
     again = f"./run kmn_perception results --samples {options.samples} --seed {options.seed}"
     if tuple(options.models) != MODELS:
         again += f" --models {shlex.join(options.models)}"
-    (folder / "README.md").write_text(page(results, settings.paper, again), encoding="utf-8")
-    print(f"wrote {folder / 'README.md'} with its figures")
+    with replacing(folder / "README.md") as new:
+        new.write_text(page(results, settings.paper, again), encoding="utf-8")
+    print(f"wrote {folder / 'README.md'} with its plots")
 
 
 def main(argv: Sequence[str] | None = None) -> None:

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.configuration.settings import Count, Fraction, Positive, load_settings
 
-PaperFigures = Mapping[str, Mapping[str, float]]  # [method]["mean" or parameter]
+PaperErrors = dict[str, dict[str, float]]  # [method]["mean" or parameter]
+
+
+def _rising(bins: tuple[float, ...]) -> tuple[float, ...]:
+    if list(bins) != sorted(set(bins)) or (bins[0], bins[-1]) != (0.0, 1.0):
+        raise ValueError("they must rise from 0 to 1")
+    return bins
 
 
 @dataclass(frozen=True)
@@ -18,7 +27,7 @@ class IcpSettings:
     Attributes
     ----------
     iterations
-        At most.
+        Maximum number.
     tolerance
         ICP ends when neither fitness nor residual changes by more, relative to themselves.
     points, target_points
@@ -27,20 +36,30 @@ class IcpSettings:
         Point-to-plane: points farther than this from the prototype do not count, metres.
     """
 
-    iterations: int
-    tolerance: float
-    points: int
-    target_points: int
-    plane_distance: float
+    iterations: Count
+    tolerance: Fraction
+    points: Annotated[int, Field(ge=3)]
+    target_points: Annotated[int, Field(ge=3)]
+    plane_distance: Positive
 
 
 @dataclass(frozen=True)
 class GicpSettings:
-    """Generalised ICP: at most so many iterations, on voxels of a size, with near points (m)."""
+    """Generalised ICP.
 
-    iterations: int
-    voxel: float
-    distance: float
+    Attributes
+    ----------
+    iterations
+        Maximum number.
+    voxel
+        Both clouds are thinned to one point in each voxel of this size, metres.
+    distance
+        Points farther than this from their partner do not count, metres.
+    """
+
+    iterations: Count
+    voxel: Annotated[float, Field(ge=1e-4)]
+    distance: Positive
 
 
 @dataclass(frozen=True)
@@ -58,68 +77,30 @@ class EvaluationSettings:
     visible_bins
         Limits of the bins of visible fraction, from 0 to 1.
     extremes
-        How many of the best and of the worst samples are named.
-    icp, gicp
+        Number of best and of worst samples that are named.
+    icp, small_gicp
         Of the peers.
     paper
         Mean absolute errors that the paper reports, by model.
     """
 
-    steps: int
-    shown_steps: int
-    peer_samples: int
-    visible_bins: tuple[float, ...]
-    extremes: int
+    steps: Count
+    shown_steps: Count
+    peer_samples: Count
+    visible_bins: Annotated[tuple[float, ...], Field(min_length=2), AfterValidator(_rising)]
+    extremes: Count
     icp: IcpSettings
-    gicp: GicpSettings
-    paper: Mapping[str, PaperFigures]
+    small_gicp: GicpSettings
+    paper: dict[str, PaperErrors]
 
     @classmethod
     def load(cls) -> EvaluationSettings:
         """Read the settings; raise ``ConfigurationError`` with the key that is wrong."""
-        section = Section.load(resources.share_directory() / "config/evaluation.yaml")
-        section.allow(
-            (
-                "steps", "shown_steps", "peer_samples", "visible_bins", "extremes", "icp",
-                "small_gicp", "paper",
+        file = resources.share_directory() / "config/evaluation.yaml"
+        settings = load_settings(cls, file)
+        if settings.shown_steps < settings.steps:
+            raise ConfigurationError(
+                f"{file.name}: 'shown_steps' must be {settings.steps} ('steps') or more, found "
+                f"{settings.shown_steps}"
             )
-        )  # fmt: skip
-        steps = section.whole_number("steps", 1, 100)
-        return cls(
-            steps=steps,
-            shown_steps=section.whole_number("shown_steps", steps, 1000),
-            peer_samples=section.whole_number("peer_samples", 1, 10**9),
-            visible_bins=_bins(section),
-            extremes=section.whole_number("extremes", 1, 100),
-            icp=_icp(section.section("icp")),
-            gicp=_gicp(section.section("small_gicp")),
-            paper=section.section("paper").values,
-        )
-
-
-def _bins(section: Section) -> tuple[float, ...]:
-    limits = section.values["visible_bins"]
-    bins = section.numbers("visible_bins", len(limits) if isinstance(limits, list) else 2)
-    if bins != sorted(set(bins)) or bins[0] != 0.0 or bins[-1] != 1.0:
-        raise section.error(f"'visible_bins' must rise from 0 to 1, found {bins}")
-    return tuple(bins)
-
-
-def _icp(section: Section) -> IcpSettings:
-    section.allow(("iterations", "tolerance", "points", "target_points", "plane_distance"))
-    return IcpSettings(
-        iterations=section.whole_number("iterations", 1, 10**6),
-        tolerance=section.number("tolerance", 0.0, 1.0),
-        points=section.whole_number("points", 3, 10**7),
-        target_points=section.whole_number("target_points", 3, 10**7),
-        plane_distance=section.number("plane_distance", 0.0, 1e3),
-    )
-
-
-def _gicp(section: Section) -> GicpSettings:
-    section.allow(("iterations", "voxel", "distance"))
-    return GicpSettings(
-        iterations=section.whole_number("iterations", 1, 10**6),
-        voxel=section.number("voxel", 1e-4, 10.0),
-        distance=section.number("distance", 0.0, 1e3),
-    )
+        return settings

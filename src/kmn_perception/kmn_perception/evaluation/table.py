@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kmn_perception.command_line.columns import columns
-from kmn_perception.evaluation.settings import PaperFigures
+from kmn_perception.evaluation.settings import PaperErrors
 
 NONE = "-"
 FEW_DIGITS = 1e-4  # smaller errors are written with an exponent
@@ -23,8 +23,8 @@ PAPER_METHOD = {
 Rows = list[list[str]]
 
 
-def report(result: dict[str, Any], paper: PaperFigures) -> str:
-    """Return the tables of an evaluation, beside the paper's figures.
+def report(result: dict[str, Any], paper: PaperErrors) -> str:
+    """Return the tables of an evaluation, beside the errors that the paper reports.
 
     Parameters
     ----------
@@ -46,17 +46,17 @@ def report(result: dict[str, Any], paper: PaperFigures) -> str:
     )
 
 
-def summary(result: dict[str, Any], paper: PaperFigures) -> Rows:
-    """Return the figures of all methods beside the paper's."""
+def summary(result: dict[str, Any], paper: PaperErrors) -> Rows:
+    """Return the statistics of all methods beside the errors that the paper reports."""
     rows = [["method", "mean", "median", "p95", "paper", "of paper", "in 95 %", "ms", "samples"]]
     for name, method in result["methods"].items():
-        figure = paper.get(PAPER_METHOD.get(name, ""), {}).get("mean")
+        reported = paper.get(PAPER_METHOD.get(name, ""), {}).get("mean")
         rows.append(
             [
                 name,
                 *[error(method[key]) for key in ("mean", "median", "p95")],
-                error(figure),
-                _ratio(method["mean"], figure),
+                error(reported),
+                _ratio(method["mean"], reported),
                 f"{100 * method['coverage95']:.1f} %" if "coverage95" in method else NONE,
                 f"{method['milliseconds']:.1f}",
                 str(method["samples"]),
@@ -72,20 +72,20 @@ def by_visible_fraction(result: dict[str, Any]) -> Rows:
     rows = [["visible", *[f"{part['low']:g} to {part['high']:g}" for part in bins]]]
     for name, method in methods.items():
         rows.append([name, *[error(part["mean"]) for part in method["by_visible_fraction"]]])
-    most = max(methods.values(), key=lambda method: int(method["samples"]))
-    rows.append(["samples", *[str(part["samples"]) for part in most["by_visible_fraction"]]])
+    largest = max(methods.values(), key=lambda method: int(method["samples"]))
+    rows.append(["samples", *[str(part["samples"]) for part in largest["by_visible_fraction"]]])
     return rows
 
 
-def by_parameter(result: dict[str, Any], paper: PaperFigures) -> Rows:
+def by_parameter(result: dict[str, Any], paper: PaperErrors) -> Rows:
     """Return the mean errors of each parameter, beside the paper's."""
     methods = result["methods"]
     names = list(next(iter(methods.values()))["per_parameter"])
     rows = [["method", *names]]
     for name, method in methods.items():
         rows.append([name, *[error(method["per_parameter"][parameter]) for parameter in names]])
-    for name, figures in paper.items():
-        rows.append([f"paper {name}", *[error(figures.get(parameter)) for parameter in names]])
+    for name, errors in paper.items():
+        rows.append([f"paper {name}", *[error(errors.get(parameter)) for parameter in names]])
     return rows
 
 
@@ -97,16 +97,16 @@ def error(value: float | None) -> str:
 
 
 def _by_step(result: dict[str, Any]) -> Rows:
-    most = max(len(method["by_step"]) for method in result["methods"].values())
-    rows = [["step", *map(str, range(most))]]
+    steps = max(len(method["by_step"]) for method in result["methods"].values())
+    rows = [["step", *map(str, range(steps))]]
     for name, method in result["methods"].items():
         errors = [error(value) for value in method["by_step"]]
-        rows.append([name, *errors, *[NONE] * (most - len(errors))])
+        rows.append([name, *errors, *[NONE] * (steps - len(errors))])
     return rows
 
 
-def _ratio(value: float, figure: float | None) -> str:
-    if figure is None:
+def _ratio(value: float, reported: float | None) -> str:
+    if reported is None:
         return NONE
-    ratio = value / figure
+    ratio = value / reported
     return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.2g}"

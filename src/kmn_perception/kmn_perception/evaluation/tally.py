@@ -1,4 +1,4 @@
-"""The figures of one method over all samples."""
+"""The statistics of one method over all samples."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Tally:
         self._measurements.append(measurement)
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures of all samples, as written to JSON."""
+        """Return the statistics of all samples, as written to JSON."""
         errors = np.stack([measurement.errors for measurement in self._measurements])
         sums = errors.sum(axis=2)
         result = sums[:, self._counted]

@@ -39,20 +39,19 @@ def visible_fraction(unit_cubes: NDArray[np.float64], camera: Camera) -> float:
 
 def _beyond_the_image(unit_cubes: NDArray[np.float64], camera: Camera) -> tuple[int, int, int, int]:
     """Return how far the cubes reach beyond the image: left, right, up, down, in pixels."""
-    to_camera = camera.world_to_camera @ unit_cubes
-    x, y, z = np.moveaxis(to_camera[:, :3, :3] @ CORNERS + to_camera[:, :3, 3:], 1, 0)
-    most = int(REACH * camera.width), int(REACH * camera.height)
+    corners = unit_cubes[:, :3, :3] @ CORNERS + unit_cubes[:, :3, 3:]
+    u, v, z = np.moveaxis(camera.project(corners.transpose(0, 2, 1)), -1, 0)
+    limit = int(REACH * camera.width), int(REACH * camera.height)
     if z.min() <= camera.near:
-        return most[0], most[0], most[1], most[1]
-    u, v = x / z * camera.fx + camera.cx, y / z * camera.fy + camera.cy
+        return limit[0], limit[0], limit[1], limit[1]
     beyond = -u.min(), u.max() - (camera.width - 1), -v.min(), v.max() - (camera.height - 1)
     return (
-        _pixels(beyond[0], most[0]),
-        _pixels(beyond[1], most[0]),
-        _pixels(beyond[2], most[1]),
-        _pixels(beyond[3], most[1]),
+        _pixels(beyond[0], limit[0]),
+        _pixels(beyond[1], limit[0]),
+        _pixels(beyond[2], limit[1]),
+        _pixels(beyond[3], limit[1]),
     )
 
 
-def _pixels(distance: float, most: int) -> int:
-    return min(max(0, int(np.ceil(distance))), most)
+def _pixels(distance: float, limit: int) -> int:
+    return min(max(0, int(np.ceil(distance))), limit)

@@ -8,17 +8,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.experiments.settings import BaselineSettings
 from kmn_perception.experiments.upright_box import UprightBox
 
-Baseline = Callable[[NDArray[np.float32]], UprightBox]
+Baseline = Callable[[NDArray[np.float32], BaselineSettings], UprightBox]
 
-HYPOTHESES = 200  # of the plane fit
-PLANE_DISTANCE = 0.005  # metres
-LEVEL = 0.2  # vertical part of a side's normal at most
 MM = 1000.0  # OpenCV's rectangles are found in millimetres, for the sake of single precision
 
 
-def open3d_box(points: NDArray[np.float32]) -> UprightBox:
+def open3d_box(points: NDArray[np.float32], settings: BaselineSettings) -> UprightBox:
     """Return open3d's smallest oriented bounding box; its z is the axis nearest to vertical."""
     import open3d
 
@@ -30,7 +28,7 @@ def open3d_box(points: NDArray[np.float32]) -> UprightBox:
     return UprightBox(np.array(box.center), np.array(box.extent)[[first, second, up]], yaw)
 
 
-def upright_rectangle(points: NDArray[np.float32]) -> UprightBox:
+def upright_rectangle(points: NDArray[np.float32], settings: BaselineSettings) -> UprightBox:
     """Return the upright box on the smallest rectangle around the points, from z = 0 to the top."""
     (x, y), (width, depth), degrees = cv2.minAreaRect(points[:, :2] * np.float32(MM))
     top = float(points[:, 2].max())
@@ -38,21 +36,21 @@ def upright_rectangle(points: NDArray[np.float32]) -> UprightBox:
     return UprightBox(centre, np.array([width / MM, depth / MM, top]), float(np.radians(degrees)))
 
 
-def plane_fit(points: NDArray[np.float32]) -> UprightBox:
+def plane_fit(points: NDArray[np.float32], settings: BaselineSettings) -> UprightBox:
     """Return the upright box along the largest upright plane, around all points, from z = 0.
 
     The plane is found by RANSAC with a fixed seed.
     """
     random = np.random.default_rng(0)
-    a, b, c = points[random.integers(len(points), size=(3, HYPOTHESES))].astype(np.float64)
+    a, b, c = points[random.integers(len(points), size=(3, settings.hypotheses))].astype(np.float64)
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    level = np.abs(normals[:, 2]) < LEVEL
+    level = np.abs(normals[:, 2]) < settings.level
     yaw = 0.0
     if level.any():
         normals, a = normals[level], a[level]
         distances = np.abs(points @ normals.T - np.sum(normals * a, axis=1))
-        best = normals[np.argmax((distances < PLANE_DISTANCE).sum(axis=0))]
+        best = normals[np.argmax((distances < settings.plane_distance).sum(axis=0))]
         yaw = float(np.arctan2(best[1], best[0]))
     return _around(points, yaw)
 

@@ -91,17 +91,11 @@ def _contour_along(
     kept = ~hole
     u, v, beyond, distance = u[kept], v[kept], beyond[kept], distance[kept]
     return Contour(
-        rays=_rays(u + 0.5 * du, v + 0.5 * dv, camera),
+        rays=camera.rays(u + 0.5 * du, v + 0.5 * dv),
         normals=outward[v, u],
         depths=depth[v, u].astype(np.float64),
         beyond=beyond,
-        beyond_rays=_rays(u + distance * du, v + distance * dv, camera),
-    )
-
-
-def _rays(u: NDArray[np.float64], v: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    return np.column_stack(
-        [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(len(u))]
+        beyond_rays=camera.rays(u + distance * du, v + distance * dv),
     )
 
 
@@ -124,7 +118,7 @@ def find_edge(
     outwards
         (3,) unit vector in the face, across the edge.
     """
-    rotation, eye = camera.pose[:3, :3], camera.pose[:3, 3]
+    rotation, eye = camera.pose[:3, :3], camera.position
     reach = plane.offset - plane.normal @ eye
     with np.errstate(divide="ignore", invalid="ignore"):
         depths = reach / (contour.rays @ rotation.T @ plane.normal)

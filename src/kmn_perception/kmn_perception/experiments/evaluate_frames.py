@@ -8,13 +8,20 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from kmn_perception.command_line.arguments import output_file, write_json
+from kmn_perception.command_line.arguments import output_file, output_folder, write_json
 from kmn_perception.configuration.resources import share_directory
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.experiments.experiment import FrameResult, load_pipeline, run
-from kmn_perception.experiments.labelled_frame import FrameError, read_frames
+from kmn_perception.experiments.labelled_frame import FrameError, check_frames, read_frames
 from kmn_perception.experiments.pictures import draw
 from kmn_perception.experiments.settings import ExperimentSettings
-from kmn_perception.experiments.statistics import details, figures, method_table, object_table
+from kmn_perception.experiments.statistics import (
+    details,
+    method_table,
+    object_table,
+    statistics,
+)
+from kmn_perception.network.weights import WeightsError
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.visualization.overlay import save_pictures
 
@@ -27,9 +34,10 @@ def evaluate(
     Raises
     ------
     FrameError
-        If the folder's files are not as expected.
+        If the folder's files are not as expected, or not of the camera's size.
     """
     frames = read_frames(folder)
+    check_frames(frames, settings)
     progress = tqdm(run(frames, pipeline, settings), "frames", len(frames), unit="frame")
     return list(progress)
 
@@ -41,16 +49,24 @@ def main() -> int:
         "folder", type=Path, nargs="?", default=share_directory() / "data" / "kinect_boxes",
         help="with NAME_d.png (16 bits, mm) and NAME_l.png (labels); default: the shipped ones",
     )  # fmt: skip
-    parser.add_argument("--json", type=output_file, help="file to write the figures to")
-    parser.add_argument("--out", type=Path, help="folder to write a picture of each frame to")
+    parser.add_argument("--json", type=output_file, help="file to write the statistics to")
+    parser.add_argument(
+        "--out", type=output_folder, help="folder to write a picture of each frame to"
+    )
     options = parser.parse_args()
-    settings, pipeline = ExperimentSettings.load(), load_pipeline()
     try:
-        results = evaluate(options.folder, pipeline, settings)
-    except FrameError as error:
+        _report(options)
+    except (ConfigurationError, FrameError, OSError, WeightsError) as error:
         print(f"evaluate_frames: {error}", file=sys.stderr)
         return 1
-    summary = figures(results, settings)
+    return 0
+
+
+def _report(options: argparse.Namespace) -> None:
+    """Evaluate the frames, print the tables, and write what was asked for."""
+    settings, pipeline = ExperimentSettings.load(), load_pipeline()
+    results = evaluate(options.folder, pipeline, settings)
+    summary = statistics(results, settings)
     print(object_table(results), method_table(summary), sep="\n\n")
     print("", details(summary), sep="\n")
     if options.out:
@@ -59,7 +75,6 @@ def main() -> int:
         print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
     if options.json:
         write_json(options.json, summary)
-    return 0
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import torch
 import yaml
 from numpy.typing import NDArray
 
@@ -26,13 +25,13 @@ from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.network import weights
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError
 from kmn_perception.scene.depth_view import DepthView
 
-REPETITIONS = 3  # of a frame, for its time
-PARAMETER_FILES = ("morph_node", "morph_node_tabletop")  # the later overrides the earlier
+PARAMETER_FILES = ("morph_node", "morph_node_tabletop")  # the second overrides the first
 
 
 class FrameResult(NamedTuple):
@@ -49,7 +48,7 @@ class FrameResult(NamedTuple):
     false_found
         Detections that belong to no labelled object: by the pipeline and by each baseline.
     seconds
-        Of one core that the pipeline took for the whole frame, the least of some repetitions.
+        Of one core that the pipeline took for the whole frame: the minimum of some repetitions.
     predictions, simulated_predictions
         Steps of the paper's network, which repeats one prediction, until the first that changes
         little: of each object that was found, and of its reference as rendered alone with the noise
@@ -71,7 +70,7 @@ class FrameResult(NamedTuple):
 
 def load_pipeline() -> MorphPipeline:
     """Return the pipeline that morph_node runs with the tabletop parameters, warmed up."""
-    torch.set_num_threads(1)
+    use_one_thread()
     values = {}
     for name in PARAMETER_FILES:
         file = yaml.safe_load(resources.find("config/nodes", name).read_text(encoding="utf-8"))
@@ -103,7 +102,7 @@ def _run(
     model = pipeline.estimator.model
     references = measure(frame, settings, model.camera.pose)
     view = DepthView.of_depth(frame.depth, settings.camera)
-    objects, seconds = _estimate(view, pipeline)
+    objects, seconds = _estimate(view, pipeline, settings.repetitions)
     try:
         pose = pipeline.camera_pose(view)
     except NoCameraPoseError:
@@ -112,7 +111,9 @@ def _run(
     detections = {"": [_detection(objects[i], pipeline) for i in found]}
     clusters = [o.observation.points for o in objects if len(o.observation.points)]
     for name, baseline in BASELINES.items():
-        detections[name] = [Detection(baseline(cluster)) for cluster in clusters]
+        detections[name] = [
+            Detection(baseline(cluster, settings.baselines)) for cluster in clusters
+        ]
     scores = {
         name: score(frame.name, references, pose, boxes, model, settings)
         for name, boxes in detections.items()
@@ -142,10 +143,12 @@ def _run(
     )
 
 
-def _estimate(view: DepthView, pipeline: MorphPipeline) -> tuple[list[ObjectEstimate], float]:
-    """Return all objects, and the seconds that it took of one core, whatever else runs beside."""
+def _estimate(
+    view: DepthView, pipeline: MorphPipeline, repetitions: int
+) -> tuple[list[ObjectEstimate], float]:
+    """Return all objects, and the seconds of one core that it took, whatever else was running."""
     seconds = []
-    for _ in range(REPETITIONS):
+    for _ in range(repetitions):
         start = time.process_time()
         objects = pipeline.estimate_all(view)
         seconds.append(time.process_time() - start)

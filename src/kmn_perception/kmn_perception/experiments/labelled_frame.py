@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.model.depth_image import PictureError, read_depth_image, read_picture
+
 DEPTH_SUFFIX, LABEL_SUFFIX = "_d.png", "_l.png"
-MM_PER_M = 1000.0
 TABLE, FIRST_OBJECT = 1, 2  # labels; 0 is the rest
-MIN_TABLE = 100  # pixels
 
 
 class FrameError(ValueError):
@@ -45,6 +46,23 @@ class LabelledFrame:
         return [int(label) for label in np.unique(self.labels) if label >= FIRST_OBJECT]
 
 
+def check_frames(frames: Sequence[LabelledFrame], settings: ExperimentSettings) -> None:
+    """Raise ``FrameError`` if a frame is not of the camera's size, or shows too little table."""
+    camera = settings.camera
+    for frame in frames:
+        if frame.depth.shape != (camera.height, camera.width):
+            raise FrameError(
+                f"{frame.name}: {_size(frame.depth)} pixels, expected the {camera.width} x "
+                f"{camera.height} of the experiment's camera (config/experiments.yaml)"
+            )
+        table = int(((frame.labels == TABLE) & np.isfinite(frame.depth)).sum())
+        if table < settings.min_table:
+            raise FrameError(
+                f"{frame.name}: {table} measured pixels are labelled {TABLE}, expected a table of "
+                f"{settings.min_table} or more"
+            )
+
+
 def read_frames(folder: Path) -> list[LabelledFrame]:
     """Read all ``NAME_d.png`` (16 bits, millimetres, 0 for none) with their ``NAME_l.png``.
 
@@ -65,31 +83,18 @@ def _by_number(file: Path) -> list[int | str]:
 
 def _read_frame(file: Path) -> LabelledFrame:
     name = file.name[: -len(DEPTH_SUFFIX)]
-    millimetres = _read_picture(file, np.uint16)
-    labels = _read_picture(file.with_name(name + LABEL_SUFFIX), np.uint8)
-    if labels.shape != millimetres.shape:
+    try:
+        depth = read_depth_image(file)
+        labels = read_picture(file.with_name(name + LABEL_SUFFIX), np.uint8)
+    except PictureError as error:
+        raise FrameError(str(error)) from error
+    if labels.shape != depth.shape:
         raise FrameError(
-            f"{name}: labels of {labels.shape[1]} x {labels.shape[0]} pixels for a depth image of "
-            f"{millimetres.shape[1]} x {millimetres.shape[0]}; expected the same size"
+            f"{name}: labels of {_size(labels)} pixels for a depth image of {_size(depth)}; "
+            "expected the same size"
         )
-    table = (labels == TABLE) & (millimetres > 0)
-    if table.sum() < MIN_TABLE:
-        raise FrameError(
-            f"{name}: {table.sum()} measured pixels are labelled {TABLE}, expected a table of "
-            f"{MIN_TABLE} or more"
-        )
-    depth = (millimetres / MM_PER_M).astype(np.float32)
-    depth[millimetres == 0] = np.nan
     return LabelledFrame(name, depth, labels)
 
 
-def _read_picture(file: Path, dtype: type[np.unsignedinteger[Any]]) -> NDArray[Any]:
-    picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.is_file() else None
-    if picture is None:
-        raise FrameError(f"{file} is missing, or not a picture")
-    if picture.ndim != 2 or picture.dtype != dtype:
-        raise FrameError(
-            f"{file} is of type {picture.dtype} and shape {picture.shape}; "
-            f"expected one channel of {np.dtype(dtype)}"
-        )
-    return picture
+def _size(image: NDArray[Any]) -> str:
+    return f"{image.shape[1]} x {image.shape[0]}"

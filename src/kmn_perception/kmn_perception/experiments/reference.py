@@ -125,7 +125,7 @@ def measure(
     points = depth_to_points(frame.depth, settings.camera).astype(np.float64)
     table = _fit_table(points[(frame.labels == TABLE) & measured], settings.faces)
     camera = replace(settings.camera, pose=pose_above(table, heading))
-    world = points @ camera.pose[:3, :3].T + camera.pose[:3, 3]
+    world = points @ camera.pose[:3, :3].T + camera.position
     boxes = []
     for label in frame.objects:
         mask = (frame.labels == label) & measured
@@ -206,7 +206,7 @@ def _sides(
 
 
 def _faces_camera(side: int, offset: float, faces: Faces, camera: Camera) -> bool:
-    eye = camera.pose[:2, 3] - faces.origin
+    eye = camera.position[:2] - faces.origin
     sign = 1.0 if side % 2 else -1.0
     return bool(sign * (faces.axes[side // 2, :2] @ eye - offset) > 0.0)
 

@@ -1,4 +1,4 @@
-"""What was found in a frame, beside its references."""
+"""What was found in a frame, compared with its references."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def score(
 
 
 def _match(
-    references: Sequence[UprightBox], found: Sequence[UprightBox], least: float
+    references: Sequence[UprightBox], found: Sequence[UprightBox], min_overlap: float
 ) -> dict[int, int]:
     """Return the detection that belongs to each reference that was found."""
     overlaps = sorted(
@@ -109,7 +109,7 @@ def _match(
     )
     pairs: dict[int, int] = {}
     for overlap, i, j in overlaps:
-        if overlap >= least and i not in pairs and j not in pairs.values():
+        if overlap >= min_overlap and i not in pairs and j not in pairs.values():
             pairs[i] = j
     return pairs
 
@@ -156,8 +156,7 @@ def _parameters(
 
 def _morphing_parameters(box: UprightBox, model: KinematicModel) -> NDArray[np.float64]:
     """Return theta of the transformation that maps a model of one box onto this box."""
-    prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))[0]
-    return model.transformation.read_back(box.unit_cube @ np.linalg.inv(prototype))
+    return model.transformation.read_back(box.unit_cube @ np.linalg.inv(model.prototype_cubes[0]))
 
 
 def _is_gross(

@@ -1,4 +1,4 @@
-"""The figures of the experiment, as written to JSON and printed."""
+"""The statistics of the experiment, as written to JSON and printed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from kmn_perception.experiments.scores import Score
 from kmn_perception.experiments.settings import ExperimentSettings
 
 NONE = "-"
-Figures = dict[str, Any]
+Statistics = dict[str, Any]
 
 
-def figures(results: Sequence[FrameResult], settings: ExperimentSettings) -> Figures:
-    """Return all figures; those of objects count of which enough is visible.
+def statistics(results: Sequence[FrameResult], settings: ExperimentSettings) -> Statistics:
+    """Return all statistics; objects count of which enough is visible.
 
-    Sizes are of sides in view. Centre and overlap are of objects of which all sides are in view:
-    those of the others the reference does not know.
+    Sizes are of sides in view. Centre and overlap are of objects of which all sides are in view;
+    of the others the reference does not know them.
     """
     scores = [s for result in results for s in result.scores]
     seconds = [result.seconds for result in results]
@@ -63,8 +63,10 @@ def _counts(score: Score, settings: ExperimentSettings) -> bool:
     return score.reference.visible >= settings.visible
 
 
-def _of_method(scores: Sequence[Score], false_found: int, settings: ExperimentSettings) -> Figures:
-    """Return the figures of one method over all objects that count."""
+def _of_method(
+    scores: Sequence[Score], false_found: int, settings: ExperimentSettings
+) -> Statistics:
+    """Return the statistics of one method over all objects that count."""
     counted = [s for s in scores if _counts(s, settings)]
     found = [s for s in counted if s.detection is not None]
     whole = [s for s in found if s.reference.in_view.all()]
@@ -86,7 +88,7 @@ def _of_method(scores: Sequence[Score], false_found: int, settings: ExperimentSe
     return result
 
 
-def _by_side(scores: Sequence[Score], settings: ExperimentSettings) -> Figures:
+def _by_side(scores: Sequence[Score], settings: ExperimentSettings) -> Statistics:
     """Return the median size errors of the longer and the shorter level side, and of the height."""
     errors: dict[str, list[float]] = {"long": [], "short": [], "height": []}
     for s in scores:
@@ -98,7 +100,7 @@ def _by_side(scores: Sequence[Score], settings: ExperimentSettings) -> Figures:
     return {name: {"median": _quantile(values, 50)} for name, values in errors.items()}
 
 
-def _reference_deviation(scores: Sequence[Score], settings: ExperimentSettings) -> Figures:
+def _reference_deviation(scores: Sequence[Score], settings: ExperimentSettings) -> Statistics:
     """Return how well the references themselves are known."""
     references = [s.reference for s in scores if _counts(s, settings)]
     yaw = [float(np.degrees(r.yaw_deviation)) for r in references]
@@ -147,9 +149,9 @@ def _row(score: Score) -> list[str]:
     ]
 
 
-def method_table(result: Figures) -> str:
+def method_table(result: Statistics) -> str:
     """Return a line for the estimates, and one for each baseline."""
-    parts: list[tuple[str, Callable[[Figures], str]]] = [
+    parts: list[tuple[str, Callable[[Statistics], str]]] = [
         ("found", lambda m: f"{m['found']} of {m['objects']}"),
         ("false", lambda m: str(m["false_found"])),
         ("yaw [deg]", lambda m: _text(m["yaw_error_deg"]["median"], 1.0, 2)),
@@ -170,7 +172,7 @@ def _text(value: float | None, scale: float, digits: int) -> str:
     return NONE if value is None else f"{scale * value:.{digits}f}"
 
 
-def details(result: Figures) -> str:
+def details(result: Statistics) -> str:
     """Return in words what the table does not hold."""
     by_side, steps = result["size_error_by_side_m"], result["predictions"]
     sides = ", ".join(f"{name} {_text(e['median'], 1e3, 1)}" for name, e in by_side.items())

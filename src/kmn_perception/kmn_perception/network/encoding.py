@@ -7,7 +7,7 @@ from torch import Tensor, nn
 
 from kmn_perception.model.kinematic_model import KinematicModel
 
-REACH = 3.0  # predictions are cut at this many half widths of the limits
+REACH = 3.0  # predictions are clipped at this many half widths of the limits
 
 
 class ParameterEncoding(nn.Module):

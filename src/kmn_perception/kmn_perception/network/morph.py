@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import count, islice
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -27,10 +27,10 @@ class Prediction(NamedTuple):
 def predictions(network: MorphNetwork, observations: Sequence[Observation]) -> Iterator[Prediction]:
     """Yield the state after each step of Algorithm 1, for as many steps as the network has."""
     values = network.start(observations)
-    for step in islice(count(), network.steps):
-        images = network.render_anew(step, observations, values)
-        predicted = network.predict(step, images)
-        values = network.concatenate(values, predicted)
+    for step in count() if network.steps is None else range(network.steps):
+        depth = network.render_anew(step, observations, values)  # of the points T^-1 P
+        predicted = network.predict(step, depth)  # (theta_bar, gamma) = f(depth)
+        values = network.concatenate(values, predicted)  # T = T T_bar
         theta_bar, _ = network.model.split(predicted)
         yield Prediction(values, np.abs(theta_bar).max(axis=1))
 
@@ -43,8 +43,8 @@ def predict(
 ) -> tuple[Prediction, int]:
     """Repeat the prediction N times, or until a step changes theta by no more than ``tolerance``.
 
-    A network with a stage for each prediction makes them all: what is right with theta may still be
-    wrong with gamma.
+    A network with a stage for each prediction makes them all: where theta is right, gamma may
+    still be wrong.
 
     Returns
     -------

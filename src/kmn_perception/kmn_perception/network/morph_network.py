@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from torch import nn
 
+from kmn_perception.configuration.section import Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 
@@ -26,19 +27,48 @@ class InputType(NamedTuple):
 class MorphNetwork(nn.Module, ABC):
     """The network f: depth image -> (theta, gamma) with the rendering that it needs.
 
+    Another design is a class of its own in a file of its own, and its name in ``designs``.
+
     Attributes
     ----------
+    name
+        Of the design: on the command line, in training settings and in weight files.
+    procedure
+        How it is trained, one of ``training.procedures.PROCEDURES``.
     model
         The object whose parameters it predicts.
     steps
         Number of predictions that it is made for; ``None`` if it may predict on and on.
     """
 
+    name: ClassVar[str]
+    procedure: ClassVar[str]
     steps: int | None = None
 
     def __init__(self, model: KinematicModel) -> None:
         super().__init__()
         self.model = model
+
+    @classmethod
+    @abstractmethod
+    def untrained(cls, model: KinematicModel, design: Section) -> MorphNetwork:
+        """Return the network that a training starts with.
+
+        Parameters
+        ----------
+        design
+            Settings of the design: the ``design`` of a training's settings, empty if it has none.
+
+        Raises
+        ------
+        ConfigurationError
+            If a setting is missing, unknown or wrong.
+        """
+
+    @classmethod
+    @abstractmethod
+    def described(cls, model: KinematicModel, design: Section) -> MorphNetwork:
+        """Return an untrained network as ``describe`` described it; raise as ``untrained`` does."""
 
     @abstractmethod
     def start(self, observations: Sequence[Observation]) -> NDArray[np.float64]:
@@ -78,4 +108,4 @@ class MorphNetwork(nn.Module, ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return the design, for the weight file; see ``weights.build``."""
+        """Return the design as the weight file keeps it, for ``described``."""

@@ -10,11 +10,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from kmn_perception.configuration.section import Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.point_rendering import point_cloud_to_depth
 from kmn_perception.network.encoding import ParameterEncoding
 from kmn_perception.network.morph_network import Inputs, InputType, MorphNetwork
+
+CONVOLUTIONS = 5
 
 
 class PaperNetwork(MorphNetwork):
@@ -29,6 +32,9 @@ class PaperNetwork(MorphNetwork):
     channels
         Output channels of the convolutions.
     """
+
+    name = "paper"
+    procedure = "algorithm2"
 
     def __init__(self, model: KinematicModel, channels: Sequence[int]) -> None:
         super().__init__(model)
@@ -45,6 +51,23 @@ class PaperNetwork(MorphNetwork):
         self._initialise()
         # Twice as fast to train on a CPU.
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+    @classmethod
+    def untrained(cls, model: KinematicModel, design: Section) -> PaperNetwork:
+        """Return a network with the ``channels`` of the design."""
+        design.allow(("channels",))
+        return cls(model, _channels(design))
+
+    @classmethod
+    def described(cls, model: KinematicModel, design: Section) -> PaperNetwork:
+        """Return the network of a description, which saw depth images as the model sees them."""
+        design.allow(("channels", "input"))
+        if design.section("input").values != vars(model.input):
+            raise design.error(
+                f"'input' is {design.values['input']}, that of model '{model.name}' is "
+                f"{vars(model.input)}"
+            )
+        return cls(model, _channels(design))
 
     def _initialise(self) -> None:
         """Kaiming weights and slightly positive biases: with few channels, dead ReLUs are fatal."""
@@ -80,7 +103,7 @@ class PaperNetwork(MorphNetwork):
 
     def start(self, observations: Sequence[Observation]) -> NDArray[np.float64]:
         """Return the prototype's 0, or, if the model says so, move it to the points' centres."""
-        values = np.zeros((len(observations), len(self.model.parameters)))
+        values = np.tile(self.model.prototype, (len(observations), 1))
         if self.model.start == "centroid":
             centres = [o.points.mean(axis=0, dtype=np.float64) for o in observations]
             for column, (kind, axis) in enumerate(self.model.transformation.kinds):
@@ -140,3 +163,10 @@ class PaperNetwork(MorphNetwork):
     def describe(self) -> dict[str, Any]:
         """Return the channels and the depth image's settings."""
         return {"channels": list(self.channels), "input": vars(self.model.input).copy()}
+
+
+def _channels(design: Section) -> list[int]:
+    channels = design.whole_numbers("channels", 1, 4096)
+    if len(channels) != CONVOLUTIONS:
+        raise design.error(f"'channels' must be {CONVOLUTIONS} numbers, found {channels}")
+    return channels

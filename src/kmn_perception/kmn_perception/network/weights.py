@@ -14,13 +14,13 @@ from safetensors.torch import save_file
 from torch import nn
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.output import replacing
 from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.network.cascade import Cascade, CascadeSettings
+from kmn_perception.network.designs import DESIGNS
 from kmn_perception.network.morph_network import MorphNetwork
-from kmn_perception.network.paper_network import PaperNetwork
 
-FORMAT = "kmn-weights-2"
+FORMAT = "kmn-weights-3"
 
 
 class WeightsError(ValueError):
@@ -38,8 +38,9 @@ class Weights:
     baseline
         The paper's network before its data were augmented; ``None`` for our design.
     metadata
-        ``model``, ``parameters``, ``limits``, ``bodies``, ``camera``, ``design`` of the network,
-        ``training`` (settings, seed), ``errors`` (measured after training) and ``format``.
+        ``model``, ``parameters``, ``limits``, ``bodies``, ``camera``, ``network`` (the name of its
+        design), ``design`` (what that design describes itself by), ``training`` (settings, seed),
+        ``errors`` (measured after training) and ``format``.
     """
 
     network: MorphNetwork
@@ -47,8 +48,8 @@ class Weights:
     metadata: dict[str, Any]
 
 
-def save(path: str | Path, weights: Weights) -> None:
-    """Write a weight file."""
+def save(path: Path, weights: Weights) -> None:
+    """Write a weight file; raise ``OSError`` where that fails, with no part of it left."""
     networks = {"network": weights.network, "baseline": weights.baseline}
     tensors = {
         f"{role}.{name}": tensor.contiguous()
@@ -56,8 +57,18 @@ def save(path: str | Path, weights: Weights) -> None:
         if network is not None
         for name, tensor in network.state_dict().items()
     }
-    known = {**weights.metadata, "design": weights.network.describe(), "format": FORMAT}
-    save_file(tensors, str(path), {key: json.dumps(value) for key, value in known.items()})
+    known = {
+        **weights.metadata,
+        "network": weights.network.name,
+        "design": weights.network.describe(),
+        "format": FORMAT,
+    }
+    text = {key: json.dumps(value) for key, value in known.items()}
+    try:
+        with replacing(path) as new:
+            save_file(tensors, str(new), text)
+    except SafetensorError as error:
+        raise OSError(f"cannot write {path}: {error}") from error
 
 
 def load(name_or_path: str | Path, model: KinematicModel) -> Weights:
@@ -81,7 +92,7 @@ def load(name_or_path: str | Path, model: KinematicModel) -> Weights:
     _check(path.name, metadata, model)
 
     def network(role: str) -> MorphNetwork:
-        built = _build(path.name, model, metadata["design"])
+        built = _build(path.name, model, metadata)
         start = f"{role}."
         _fill(path.name, built, {
             key.removeprefix(start): tensor
@@ -127,20 +138,16 @@ def _check(name: str, metadata: Mapping[str, Any], model: KinematicModel) -> Non
             )
 
 
-def _build(name: str, model: KinematicModel, design: Mapping[str, Any]) -> MorphNetwork:
-    """Return an untrained network of a design, see ``MorphNetwork.describe``."""
-    if "cascade" in design:
-        try:
-            settings = CascadeSettings.read(Section(design["cascade"], f"{name}: design"))
-        except ConfigurationError as error:
-            raise WeightsError(f"{name} describes no network of ours: {error}") from error
-        return Cascade(model, settings, design["stages"])
-    if design["input"] != vars(model.input):
-        raise WeightsError(
-            f"{name} was trained for another model: its input is {design['input']}, "
-            f"that of model '{model.name}' is {vars(model.input)}"
-        )
-    return PaperNetwork(model, design["channels"])
+def _build(name: str, model: KinematicModel, metadata: Mapping[str, Any]) -> MorphNetwork:
+    """Return the untrained network that a file describes."""
+    design = metadata.get("network")
+    if design not in DESIGNS:
+        known = ", ".join(DESIGNS)
+        raise WeightsError(f"{name} holds a network of design {design!r} (known: {known})")
+    try:
+        return DESIGNS[design].described(model, Section(metadata.get("design"), f"{name}: design"))
+    except ConfigurationError as error:
+        raise WeightsError(f"{name} describes no network for '{model.name}': {error}") from error
 
 
 def _fill(name: str, network: nn.Module, state: Mapping[str, Any]) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from pydantic import Field
 
 from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.configuration.settings import Positive
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
@@ -48,14 +51,14 @@ class Window:
         margin
             Size of the window over that of the body's image.
         area
-            Number of pixels, about; both sides are multiples of 8.
+            Approximate number of pixels; both sides are multiples of 8.
 
         Raises
         ------
         ConfigurationError
             If the canonical camera does not see the prototype's body.
         """
-        prototype = model.unit_cubes(np.zeros(len(model.theta)), np.zeros(len(model.gamma)))
+        prototype = model.prototype_cubes
         v, u = np.nonzero(~np.isnan(render(prototype[body : body + 1], model.camera)))
         if not len(u):
             raise ConfigurationError(
@@ -64,7 +67,7 @@ class Window:
         low, high = np.array([u.min(), v.min()]) - 0.5, np.array([u.max(), v.max()]) + 0.5
         centre, size = (low + high) / 2.0, (high - low) * margin
         pixels = np.maximum(8, np.rint(np.sqrt(area * size / size[::-1]) / 8.0).astype(int) * 8)
-        camera = _cut(model.camera, centre - size / 2.0, size, pixels)
+        camera = _crop(model.camera, centre - size / 2.0, size, pixels)
         return cls(body, camera, _plane(render(prototype, camera)))
 
 
@@ -75,16 +78,16 @@ class WindowSettings:
     Attributes
     ----------
     reach
-        Depths farther than this (metres) from the prototype's surface are cut.
+        Depths are clipped at this distance (metres) from the prototype's surface.
     supersampling
         The points are splatted this many times finer, then averaged.
     max_gap
         Holes of up to this many pixels of the finer grid are closed.
     """
 
-    reach: float
-    supersampling: int
-    max_gap: int
+    reach: Positive
+    supersampling: Annotated[int, Field(ge=1, le=16)]
+    max_gap: Annotated[int, Field(ge=0, le=64)]
 
 
 def render_window(
@@ -94,7 +97,7 @@ def render_window(
     observation: Observation,
     values: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Render the observation, morphed by the estimated parameters, anew in a window.
+    """Render the observation, morphed by the estimated parameters, in a window.
 
     The points are morphed such that the window's body, if the estimate is right, comes to lie on
     that of the prototype: the paper's T_theta^-1 (Eq. 5), and the like for gamma.
@@ -128,14 +131,12 @@ def morph_of_body(
     model: KinematicModel, body: int, values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the map (4, 4) of a body of m(theta, gamma) onto that of the prototype."""
-    theta, gamma = model.split(values)
-    zero = np.zeros(len(model.theta)), np.zeros(len(model.gamma))
-    here, there = model.unit_cubes(theta, gamma)[body], model.unit_cubes(*zero)[body]
-    morph: NDArray[np.float64] = there @ np.linalg.inv(here)
+    cube = model.unit_cubes(*model.split(values))[body]
+    morph: NDArray[np.float64] = model.prototype_cubes[body] @ np.linalg.inv(cube)
     return morph
 
 
-def _cut(
+def _crop(
     camera: Camera, low: NDArray[np.float64], size: NDArray[np.float64], pixels: NDArray[np.int_]
 ) -> Camera:
     """Return the camera whose image is the part from the pixel edge ``low`` of this ``size``."""

@@ -1,4 +1,4 @@
-"""Camera pose from the plane that supports the scene: a table or the floor."""
+"""The plane that supports the objects, a table or the floor, and the camera's pose above it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ HYPOTHESES = 256  # finds a plane of 30 % of the points with a probability of 99
 SCORED_POINTS = 1024
 FITTED_POINTS = 8192
 REFINEMENTS = 3
+MIN_RISE = 0.3  # metres; level surfaces that lie less above a support are tops of objects on it
+PARALLEL = np.cos(np.radians(5.0))  # between the normals of two level surfaces
+MAX_OBJECT = 0.5  # metres above a surface up to which what is seen stands on it
+MIN_STANDING = 0.01  # of the points off the largest plane; fewer above a surface are noise
+EXTENT = (2.0, 98.0)  # percentiles; a surface reaches from one to the other
 IMAGE_UP = np.array([0.0, -1.0, 0.0])  # in the optical frame (REP-103: x right, y down, z forward)
 
 
@@ -28,7 +33,8 @@ class SupportPlaneSettings:
         Largest angle between the plane's normal and the image's up direction, in radians,
         below pi / 2. It keeps walls and the sides of objects from being taken for the support.
     min_fraction : float
-        Least part of all measured points that lie on the plane, 0..1.
+        Minimum share of the measured points that lie on the plane, 0..1; for a higher plane, of
+        those that do not lie on the largest one.
     """
 
     distance: float
@@ -55,9 +61,12 @@ class SupportPlane:
 def find_support_plane(
     points: NDArray[np.float32], settings: SupportPlaneSettings
 ) -> SupportPlane | None:
-    """Find the largest upward plane below the camera: RANSAC, then least squares.
+    """Find the level plane below the camera on which the objects stand.
 
-    The random numbers have a fixed seed, so that the same points give the same plane.
+    This is the largest one (RANSAC, then least squares), or the highest above it that is large
+    enough and on which something stands: at a table's edge more of the floor may be in view than of
+    the table. The random numbers have a fixed seed, so that the same points give the
+    same plane.
 
     Parameters
     ----------
@@ -76,15 +85,19 @@ def find_support_plane(
     if len(measured) < 3:
         return None
     sample = flat[random.choice(measured, FITTED_POINTS)].astype(np.float64)
-    plane = _best_hypothesis(sample[:SCORED_POINTS], random, settings)
-    for _ in range(REFINEMENTS):
-        if plane is None:
-            return None
-        inliers = _on_plane(sample, plane, settings)
-        plane = _least_squares(sample[inliers]) if inliers.sum() >= 3 else None
-    if plane is None or _on_plane(sample, plane, settings).mean() < settings.min_fraction:
+    largest = _best_hypothesis(sample[:SCORED_POINTS], random, settings)
+    support = _fit(sample, largest, settings)
+    if support is None:
         return None
-    return plane
+    rest = sample[~_on_plane(sample, support, settings)]
+    for height in _heights_of_surfaces(rest, support, settings):
+        raised = SupportPlane(support.normal, support.height - height)
+        plane = _fit(rest, raised, settings)
+        if plane is None or plane.normal @ support.normal < PARALLEL:
+            continue
+        if _something_stands_on(rest, plane, settings):
+            return plane
+    return support
 
 
 def pose_above(plane: SupportPlane, canonical_pose: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -136,6 +149,49 @@ def _best_hypothesis(
     normals, heights = normals[level], heights[level]
     best = np.argmax(_count_inliers(points, normals, heights, settings.distance))
     return SupportPlane(normals[best], float(heights[best]))
+
+
+def _fit(
+    points: NDArray[np.float64], plane: SupportPlane | None, settings: SupportPlaneSettings
+) -> SupportPlane | None:
+    """Fit a plane to the points (N, 3) near it; None where these are too few."""
+    for _ in range(REFINEMENTS):
+        if plane is None:
+            return None
+        inliers = _on_plane(points, plane, settings)
+        plane = _least_squares(points[inliers]) if inliers.sum() >= 3 else None
+    if plane is None or _on_plane(points, plane, settings).mean() < settings.min_fraction:
+        return None
+    return plane
+
+
+def _heights_of_surfaces(
+    points: NDArray[np.float64], plane: SupportPlane, settings: SupportPlaneSettings
+) -> list[float]:
+    """Return the heights (metres above a plane) at which many points lie level, from the top."""
+    ends = MIN_RISE, plane.height
+    bins = int((ends[1] - ends[0]) / settings.distance)
+    if bins < 2:
+        return []
+    counts, edges = np.histogram(points @ plane.normal + plane.height, bins, ends)
+    around = counts[:-1] + counts[1:]
+    # Half of them: noise and a plane that is a little oblique spread the points.
+    many = around >= max(settings.min_fraction * len(points) / 2.0, 1.0)
+    padded = np.pad(around, 1)
+    peaks = np.flatnonzero(many & (around >= padded[:-2]) & (around > padded[2:]))
+    return [float(edges[peak + 1]) for peak in peaks[::-1]]
+
+
+def _something_stands_on(
+    points: NDArray[np.float64], plane: SupportPlane, settings: SupportPlaneSettings
+) -> bool:
+    """Tell whether there are points above a surface, no higher than objects are."""
+    level = _level_axes(plane.normal, np.array([0.0, 0.0, 1.0]))[:, :2]
+    low, high = np.percentile(points[_on_plane(points, plane, settings)] @ level, EXTENT, axis=0)
+    height, place = points @ plane.normal + plane.height, points @ level
+    above = (height > 3.0 * settings.distance) & (height < MAX_OBJECT)
+    above &= ((place > low) & (place < high)).all(axis=1)
+    return bool(above.mean() >= MIN_STANDING)
 
 
 @njit(cache=True)

@@ -10,13 +10,16 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import mse_loss
 
-from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network.encoding import ParameterEncoding
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
-from kmn_perception.network.paper_network import PaperNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
-from kmn_perception.training.settings import TrainingSettings
+from kmn_perception.training.settings import (
+    Algorithm2Settings,
+    TrainingSettings,
+    ValidationSettings,
+)
 from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
 
@@ -24,19 +27,22 @@ from kmn_perception.training.workers import Workers
 class Algorithm2(Training):
     """Train a network on rendered data, augment the data with its predictions, retrain."""
 
-    network: PaperNetwork
+    settings_type = Algorithm2Settings
 
     def __init__(
-        self, model: KinematicModel, settings: TrainingSettings, run: Run, workers: Workers
+        self,
+        network: MorphNetwork,
+        settings: TrainingSettings,
+        validation: ValidationSettings,
+        run: Run,
+        workers: Workers,
     ) -> None:
-        super().__init__(model, settings, run, workers)
-        self.network = PaperNetwork(model, settings.channels).to(workers.device)
+        super().__init__(network, settings, validation, run, workers)
+        assert isinstance(settings, Algorithm2Settings)
+        self.encoding = ParameterEncoding(network.model, network.model.symmetry)
         self.baseline = copy.deepcopy(self.network)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
         self.augmented = math.ceil(self.samples * settings.augmentation)  # N_aug
-        capacity = self.samples + settings.rounds * self.augmented
-        folder = run.folder / f"data{workers.rank}"
-        self.data = Dataset(folder, self.network.input_types(0), len(model.parameters), capacity)
 
     @property
     def networks(self) -> dict[str, MorphNetwork]:
@@ -44,7 +50,11 @@ class Algorithm2(Training):
         return {"network": self.network, "baseline": self.baseline}
 
     def begin_round(self) -> None:
-        """Nothing: network, data set and optimiser go on from round to round."""
+        """Open the data set; network, data and optimiser go on from round to round."""
+        capacity = self.samples + self.settings.rounds * self.augmented
+        folder = self.run.folder / f"data{self.workers.rank}"
+        types, parameters = self.network.input_types(0), len(self.model.parameters)
+        self.data = Dataset(folder, types, parameters, capacity, self.state.filled)
 
     def generate(self) -> None:
         """Add samples to the data set, morphed by the network's own predictions."""
@@ -71,7 +81,7 @@ class Algorithm2(Training):
 
     def loss(self, outputs: Tensor, values: Tensor) -> Tensor:
         """Return the mean squared error."""
-        return mse_loss(outputs, self.network.encoding.encode(values))
+        return mse_loss(outputs, self.encoding.encode(values))
 
     def end_round(self) -> None:
         """Keep the first network as the baseline."""

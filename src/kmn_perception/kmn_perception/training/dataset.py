@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from kmn_perception.network.morph_network import Inputs, InputType
+from kmn_perception.training.run import RunError
 
 
 class Dataset:
@@ -19,22 +22,35 @@ class Dataset:
     Parameters
     ----------
     folder
-        Where the arrays lie; an existing data set there is continued.
+        Where the arrays lie.
     inputs
         The network's inputs.
     parameters
         Number n + m of morphing parameters.
+    filled
+        Number of samples that are there already; with none, an empty data set is made.
+
+    Raises
+    ------
+    RunError
+        If there is no room for the data set, or one that is filled is not there as it was.
     """
 
     def __init__(
-        self, folder: Path, inputs: Sequence[InputType], parameters: int, capacity: int
+        self,
+        folder: Path,
+        inputs: Sequence[InputType],
+        parameters: int,
+        capacity: int,
+        filled: int,
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
+        memory_map = _open if filled else _make
         self.inputs = [
-            _memory_map(folder / f"input{i}.npy", (capacity, *shape), np.dtype(dtype))
+            memory_map(folder / f"input{i}.npy", (capacity, *shape), np.dtype(dtype))
             for i, (shape, dtype) in enumerate(inputs)
         ]
-        self.values = _memory_map(
+        self.values = memory_map(
             folder / "values.npy", (capacity, parameters), np.dtype(np.float64)
         )
 
@@ -50,9 +66,37 @@ class Dataset:
         return inputs, torch.from_numpy(self.values[rows].astype(np.float32))
 
 
-def _memory_map(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:
-    if path.exists():
-        found: np.memmap = np.lib.format.open_memmap(path, mode="r+")
-        if found.shape == shape and found.dtype == dtype:
-            return found
-    return np.lib.format.open_memmap(path, mode="w+", shape=shape, dtype=dtype)
+def _open(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:
+    """Open the array of an earlier start of the run, which must be there as it was."""
+    try:
+        found: np.memmap = np.lib.format.open_memmap(path, mode="r")
+    except (OSError, ValueError) as error:
+        raise _lost(path, "cannot be read") from error
+    if (found.shape, found.dtype) != (shape, dtype):
+        expected = f"expected {dtype} of shape {shape}"
+        raise _lost(path, f"holds {found.dtype} of shape {found.shape}, {expected}")
+    return np.lib.format.open_memmap(path, mode="r+")
+
+
+def _make(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:
+    """Make an array, with all of its room on the disk: a memory map of a full disk would crash."""
+    try:
+        made: np.memmap = np.lib.format.open_memmap(path, mode="w+", shape=shape, dtype=dtype)
+        with path.open("r+b") as file:
+            os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        needed = np.prod(shape, dtype=np.float64) * dtype.itemsize / 1e6
+        free = shutil.disk_usage(path.parent).free / 1e6
+        raise RunError(
+            f"no room for {path}, a part of the training data: it takes {needed:.1f} MB, "
+            f"{free:.1f} MB are free ({error.strerror}); choose another folder with --run"
+        ) from error
+    return made
+
+
+def _lost(path: Path, what: str) -> RunError:
+    return RunError(
+        f"the run cannot be resumed, its training data {path} {what}; "
+        "put the file back, or use --restart to train anew"
+    )

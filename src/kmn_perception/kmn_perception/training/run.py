@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import torch
 
-CHECKPOINT_SECONDS = 60.0
+from kmn_perception.configuration.output import replacing
 
 
 class RunError(ValueError):
-    """The folder belongs to a run with other settings."""
+    """A run cannot go on; the text says why, and what to do."""
 
 
 class Run:
@@ -26,10 +26,12 @@ class Run:
         Made if it does not exist; else the run in it is resumed.
     settings
         What the run was started with; to resume with other settings raises ``RunError``.
+    checkpoint_seconds
+        Between two checkpoints.
     """
 
-    def __init__(self, folder: Path, settings: dict[str, Any]) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, settings: dict[str, Any], checkpoint_seconds: float) -> None:
+        self.folder, self._checkpoint_seconds = folder, checkpoint_seconds
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(settings, indent=2)
         file = folder / "settings.json"
@@ -58,19 +60,34 @@ class Run:
 
     def checkpoint_is_due(self) -> bool:
         """Tell whether the last checkpoint is old, or the run shall stop."""
-        return self.interrupted or time.monotonic() - self._saved > CHECKPOINT_SECONDS
+        return self.interrupted or time.monotonic() - self._saved > self._checkpoint_seconds
 
     def save(self, checkpoint: dict[str, Any]) -> None:
-        """Replace the checkpoint in one go, so that an interrupt never leaves half a file."""
-        new = self.folder / "checkpoint.new"
-        torch.save(checkpoint, new)
-        os.replace(new, self.folder / "checkpoint.pt")
+        """Replace the checkpoint; raise ``RunError`` where that fails, with the last one kept."""
+        file = self.folder / "checkpoint.pt"
+        try:
+            with replacing(file) as new:
+                torch.save(checkpoint, new)
+        except (OSError, RuntimeError) as error:  # of torch's own writer
+            raise RunError(
+                f"cannot write {file}: {_first_line(error)}; "
+                "the same command goes on from the last checkpoint when there is room again"
+            ) from error
         self._saved = time.monotonic()
 
     def load(self, device: torch.device) -> dict[str, Any] | None:
-        """Return the last checkpoint, if there is one."""
+        """Return the last checkpoint, if there is one; raise ``RunError`` if it is damaged."""
         file = self.folder / "checkpoint.pt"
         if not file.exists():
             return None
-        checkpoint: dict[str, Any] = torch.load(file, map_location=device, weights_only=True)
+        try:
+            checkpoint: dict[str, Any] = torch.load(file, map_location=device, weights_only=True)
+        except (EOFError, OSError, RuntimeError, UnpicklingError) as error:
+            raise RunError(
+                f"{file} is damaged ({_first_line(error)}); use --restart to train anew"
+            ) from error
         return checkpoint
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).split("\n")[0].strip() or type(error).__name__

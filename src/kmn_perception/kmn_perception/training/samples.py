@@ -14,9 +14,8 @@ from kmn_perception.model.observation import FreeSpace, Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.scene.free_space import EMPTY, UNKNOWN
-from kmn_perception.training.settings import SensorSettings
+from kmn_perception.training.settings import SensorSettings, SharedSettings, ViewSettings
 
-MIN_POINTS = 100  # a sample of which less is seen is drawn again
 EVALUATION = (1,)  # spawn key that sets the evaluation's samples apart from all that train
 
 
@@ -49,7 +48,7 @@ def sample(
             observation = observe(model, values, model.camera, noise, generator)
         else:
             observation = _observe_from_around(model, values, sensor, generator)
-        if len(observation.points) >= MIN_POINTS:
+        if len(observation.points) >= _views().min_points:
             return observation, values
 
 
@@ -86,7 +85,8 @@ def _observe_from_around(
     if len(cloud) and generator.uniform() < sensor.occlusion:
         direction = generator.standard_normal(3)
         along = cloud @ direction.astype(np.float32)
-        nearest = float(np.quantile(along, generator.uniform(0.0, 0.4)))
+        share = generator.uniform(0.0, _views().max_hidden)
+        nearest = float(np.quantile(along, share))
         _hide(free, depth, believed, direction, nearest)
         cloud = cloud[along >= nearest]
     return Observation(cloud, believed, floor, FreeSpace(free, np.zeros_like(free, np.bool_)))
@@ -99,20 +99,25 @@ def _hide(
     direction: NDArray[np.float64],
     nearest: float,
 ) -> None:
-    """Let pixels be unknown whose points, or points beside the object, lie before a plane."""
+    """Mark the pixels as unknown in which the object, or the space beside it, is hidden.
+
+    Hidden is what lies before the plane at ``nearest`` along the direction. Pixels beside the
+    object are judged at its median depth.
+    """
     v, u = np.indices(depth.shape, dtype=np.float32)
     a, b, c = direction @ camera.pose[:3, :3]
     along = (u - camera.cx) * (a / camera.fx) + (v - camera.cy) * (b / camera.fy) + c
     along *= np.where(np.isnan(depth), np.nanmedian(depth), depth)
-    free[along < nearest - direction @ camera.pose[:3, 3]] = UNKNOWN
+    free[along < nearest - direction @ camera.position] = UNKNOWN
 
 
 def _punch_holes(depth: NDArray[np.float32], generator: np.random.Generator) -> None:
-    """Lose the depth in up to eight discs, as on shining or dark patches and in shadows."""
+    """Lose the depth in a few discs, as on shining or dark patches and in shadows."""
+    views = _views()
     rows, columns = np.nonzero(~np.isnan(depth))
-    for _ in range(generator.integers(1, 9) if len(rows) else 0):
+    for _ in range(generator.integers(1, views.max_holes + 1) if len(rows) else 0):
         centre = generator.integers(len(rows))
-        radius = generator.uniform(2.0, 12.0)  # pixels
+        radius = generator.uniform(*views.hole_radius)
         near = np.hypot(rows - rows[centre], columns - columns[centre]) < radius
         depth[rows[near], columns[near]] = np.nan
 
@@ -128,6 +133,11 @@ def _wrong(
     u, _, vt = np.linalg.svd(axes)
     wrong[:3, :3] = u @ vt
     return wrong
+
+
+@cache
+def _views() -> ViewSettings:
+    return SharedSettings.load().views
 
 
 @cache
@@ -149,5 +159,5 @@ def _place(
     azimuth = heading + generator.uniform(*sensor.azimuth)
     back = -np.array([np.cos(azimuth), np.sin(azimuth), 0.0]) * np.cos(elevation)
     back[2] = np.sin(elevation)
-    aim = target + generator.uniform(-0.2, 0.2, size=3) * distance
+    aim = target + generator.uniform(-_views().aim, _views().aim, size=3) * distance
     return replace(camera, pose=look_at(target + back * distance, aim))

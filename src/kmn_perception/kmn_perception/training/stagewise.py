@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import smooth_l1_loss
 
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.network.cascade import Cascade, CascadeSettings, Stage
+from kmn_perception.network.cascade import Cascade
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.stage import Stage
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
-from kmn_perception.training.settings import StagewiseSettings, TrainingSettings
+from kmn_perception.training.settings import (
+    StagewiseSettings,
+    TrainingSettings,
+    ValidationSettings,
+)
 from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
 
@@ -35,11 +39,15 @@ class StagewiseTraining(Training):
     network: Cascade
 
     def __init__(
-        self, model: KinematicModel, settings: TrainingSettings, run: Run, workers: Workers
+        self,
+        network: MorphNetwork,
+        settings: TrainingSettings,
+        validation: ValidationSettings,
+        run: Run,
+        workers: Workers,
     ) -> None:
-        super().__init__(model, settings, run, workers)
+        super().__init__(network, settings, validation, run, workers)
         self.stagewise = StagewiseSettings.load()
-        self.network = Cascade(model, CascadeSettings.load(), stages=0).to(workers.device)
 
     @property
     def networks(self) -> dict[str, MorphNetwork]:
@@ -57,7 +65,8 @@ class StagewiseTraining(Training):
         self.copies = 1 + (self.stagewise.shuffled if step else 0)
         folder = self.run.folder / f"data{self.workers.rank}" / f"round{step}"
         types, parameters = self.network.input_types(step), len(self.model.parameters)
-        self.data = Dataset(folder, types, parameters, self.samples * self.copies)
+        capacity = self.samples * self.copies
+        self.data = Dataset(folder, types, parameters, capacity, self.state.filled)
 
     def generate(self) -> None:
         """Fill the data set with samples that are morphed by the stages before."""
@@ -122,8 +131,8 @@ class StagewiseTraining(Training):
     def loss(self, outputs: Tensor, values: Tensor) -> Tensor:
         """Return the absolute error, rounded off near 0, in units of what is to be predicted.
 
-        The mean absolute error is what the paper measures; it is least at the median of what a view
-        leaves open. As for the paper's network, the parameters are weighted by the root of their
+        The mean absolute error is what the paper measures; the median of what a view leaves unknown
+        minimises it. As for the paper's network, the parameters are weighted by the root of their
         size.
         """
         stage = self.fitted()

@@ -8,55 +8,74 @@ import shutil
 import signal
 import sys
 import warnings
-from pathlib import Path
 from typing import Any
 
 import torch
 
-from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.command_line.arguments import output_file, output_folder, whole_number
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
-from kmn_perception.training.algorithm2 import Algorithm2
+from kmn_perception.network.designs import DESIGNS
+from kmn_perception.training.procedures import load_training_settings, procedure_of
 from kmn_perception.training.run import Run, RunError
-from kmn_perception.training.settings import TrainingSettings
-from kmn_perception.training.stagewise import StagewiseTraining
+from kmn_perception.training.settings import SharedSettings, TrainingSettings
 from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
+
+CHANGES = ("network", "samples", "epochs", "retrain_epochs", "rounds", "seed")
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """Parse the command line."""
     parser = argparse.ArgumentParser(prog="train", description=__doc__)
+    count, positive = whole_number(0), whole_number(1)
     parser.add_argument("--model", required=True, help="name or YAML file of the kinematic model")
-    parser.add_argument("--out", required=True, type=Path, help="weight file to write")
+    parser.add_argument("--out", required=True, type=output_file, help="weight file to write")
     parser.add_argument("--config", help="name or YAML file of the settings (default: the model's)")
-    parser.add_argument("--samples", type=int, help="N_data in place of the settings'")
-    parser.add_argument("--epochs", type=int, help="epochs of the first training")
-    parser.add_argument("--retrain-epochs", type=int, help="epochs of each later round")
-    parser.add_argument("--rounds", type=int, help="largest number of later rounds")
-    parser.add_argument("--seed", type=int, help="seed of data, initialisation and order")
-    parser.add_argument("--run", type=Path, help="folder of the run (default: beside --out)")
+    parser.add_argument("--network", choices=DESIGNS, help="design in place of the settings'")
+    parser.add_argument("--samples", type=whole_number(10), help="N_data in place of the settings'")
+    parser.add_argument("--epochs", type=positive, help="epochs of the first round")
+    parser.add_argument("--retrain-epochs", type=positive, help="epochs of each later round")
+    parser.add_argument("--rounds", type=count, help="largest number of later rounds")
+    parser.add_argument("--seed", type=count, help="seed of data, initialisation and order")
+    parser.add_argument(
+        "--run", type=output_folder, help="folder of the run (default: beside --out)"
+    )
     parser.add_argument("--restart", action="store_true", help="discard an earlier run")
-    parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
-    parser.add_argument("--threads", type=int, default=1, help="threads of torch")
+    parser.add_argument("--device", default="auto", choices=("auto", "cpu", "cuda"))
+    parser.add_argument("--threads", type=positive, default=1, help="threads of torch")
     return parser.parse_args(argv)
 
 
 def settings_of(options: argparse.Namespace) -> TrainingSettings:
-    """Return the settings of the file with those of the command line in their place."""
-    settings = TrainingSettings.load(options.config or options.model)
-    names = ("samples", "epochs", "retrain_epochs", "rounds", "seed")
-    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    return dataclasses.replace(settings, **given)
+    """Return the settings of the file with those of the command line in their place.
+
+    Without ``--config`` they are those shipped for the model and the given design, if there are
+    any, else those of the model.
+    """
+    given = {name: getattr(options, name) for name in CHANGES}
+    changes = {name: value for name, value in given.items() if value is not None}
+    shipped = resources.share_directory() / "config/training"
+    name = f"{options.network}/{options.model}"
+    if options.config or not (shipped / f"{name}.yaml").is_file():
+        name = options.config or options.model
+    return load_training_settings(name, changes)
 
 
 def train(options: argparse.Namespace) -> None:
     """Train as the options say, and write the weight file."""
-    model, settings = KinematicModel.load(options.model), settings_of(options)
+    model, settings, shared = (
+        KinematicModel.load(options.model), settings_of(options), SharedSettings.load(),
+    )  # fmt: skip
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
     torch.set_flush_denormal(True)  # tiny activations would slow a CPU down several times
     warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
+    torch.manual_seed(settings.seed)
+    design = Section(settings.design, "training settings: design")
+    network = DESIGNS[settings.network].untrained(model, design)
     with Workers(options.device) as workers:
         if options.restart and workers.rank == 0 and folder.exists():
             shutil.rmtree(folder)
@@ -64,11 +83,12 @@ def train(options: argparse.Namespace) -> None:
             **weights.describe(model),
             "training": dataclasses.asdict(settings),
         }
-        run = Run(folder, {**known, "processes": workers.count})
+        run = Run(folder, {**known, "processes": workers.count}, shared.checkpoint_seconds)
         for interruption in (signal.SIGINT, signal.SIGTERM):
             signal.signal(interruption, run.interrupt)
-        kind = Algorithm2 if settings.network == "paper" else StagewiseTraining
-        training = kind(model, settings, run, workers)
+        training = procedure_of(settings.network)(
+            network, settings, shared.validation, run, workers
+        )
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
         )
@@ -97,7 +117,7 @@ def main() -> None:
         train(options)
     except KeyboardInterrupt:
         sys.exit("interrupted; the same command resumes from the last checkpoint")
-    except (ConfigurationError, FileNotFoundError, RunError) as error:
+    except (ConfigurationError, OSError, RunError) as error:
         sys.exit(f"train: {error}")
 
 

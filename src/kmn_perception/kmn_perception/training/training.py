@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -16,19 +16,16 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from kmn_perception.evaluation.errors import errors_by_step
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
+from kmn_perception.network.errors import errors_by_step
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
 from kmn_perception.training.samples import sample
-from kmn_perception.training.settings import TrainingSettings
+from kmn_perception.training.settings import TrainingSettings, ValidationSettings
 from kmn_perception.training.workers import Workers
 
 VALIDATION = (2,)  # spawn key of the samples that measure a training
-VALIDATION_SAMPLES = 500
-VALIDATION_STEPS = 5
 
 
 @dataclass
@@ -48,21 +45,28 @@ class Training(ABC):
 
     Parameters
     ----------
+    network
+        Untrained.
     run
         Keeps checkpoints and curves.
     workers
         The processes that train together; each generates and keeps its own share of the data.
     """
 
-    network: MorphNetwork
+    settings_type: ClassVar[type[TrainingSettings]] = TrainingSettings
     optimiser: torch.optim.Optimizer
     data: Dataset
 
     def __init__(
-        self, model: KinematicModel, settings: TrainingSettings, run: Run, workers: Workers
+        self,
+        network: MorphNetwork,
+        settings: TrainingSettings,
+        validation: ValidationSettings,
+        run: Run,
+        workers: Workers,
     ) -> None:
-        torch.manual_seed(settings.seed)
-        self.model, self.settings, self.run, self.workers = model, settings, run, workers
+        self.network, self.model = network.to(workers.device), network.model
+        self.settings, self.validation, self.run, self.workers = settings, validation, run, workers
         self.state = TrainingState()
         self.samples = math.ceil(settings.samples / workers.count)  # N_data of this process
 
@@ -158,11 +162,11 @@ class Training(ABC):
         """Measure the error by prediction step on samples that are never trained on."""
         pairs = [
             sample(self.model, self.settings.seed, i, self.settings.sensor, spawn_key=VALIDATION)
-            for i in range(VALIDATION_SAMPLES)
+            for i in range(self.validation.samples)
         ]
         observations = [observation for observation, _ in pairs]
         truth = np.stack([values for _, values in pairs])
-        errors = errors_by_step(self.cpu_network(), observations, truth, VALIDATION_STEPS)
+        errors = errors_by_step(self.cpu_network(), observations, truth, self.validation.steps)
         self.state.errors.append(errors.sum(axis=2).mean(axis=1).tolist())
         by_step = " ".join(f"{error:.5f}" for error in self.state.errors[-1])
         self.workers.say(f"round {self.state.round}: error after 0, 1, ... predictions: {by_step}")

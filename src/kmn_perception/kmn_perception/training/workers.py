@@ -10,6 +10,8 @@ from torch import distributed, nn
 from torch.nn.parallel import DistributedDataParallel
 from tqdm import tqdm
 
+from kmn_perception.training.run import RunError
+
 
 class Workers:
     """A context in which this process knows its rank, the count of processes and its device."""
@@ -20,6 +22,8 @@ class Workers:
         if device == "auto":
             device = "cuda" if torch.cuda.is_available() else "cpu"
         if device == "cuda":
+            if not torch.cuda.is_available():
+                raise RunError("there is no CUDA device; use --device cpu or auto")
             device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
         self.device = torch.device(device)
 

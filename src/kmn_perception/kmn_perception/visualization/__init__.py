@@ -1,4 +1,4 @@
 """Pictures of estimated models over the depth images that they were estimated from.
 
-Imports ``model`` only.
+Imports ``model`` and ``configuration``.
 """

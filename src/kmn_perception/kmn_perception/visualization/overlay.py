@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from kmn_perception.configuration.output import replacing
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.model.transformation import transform_points
@@ -83,7 +84,8 @@ def save_picture(path: Path, overlay: Overlay) -> None:
     """Write one overlay as a picture."""
     figure = Figure(figsize=(8, 6.4), dpi=120, layout="constrained")
     _draw(figure.subplots(), overlay, line_width=2.5, font_size=13)
-    figure.savefig(path)
+    with replacing(path) as new:
+        figure.savefig(new)
 
 
 def save_pictures(overlays: Iterable[Overlay], count: int, folder: Path) -> Path:
@@ -104,7 +106,8 @@ def save_contact_sheet(path: Path, overlays: Sequence[Overlay]) -> None:
         axes.set_axis_off()
     for axes, overlay in zip(figure.axes, overlays, strict=False):
         _draw(axes, overlay, line_width=1.5, font_size=9)
-    figure.savefig(path)
+    with replacing(path) as new:
+        figure.savefig(new)
 
 
 def _draw(axes: Axes, overlay: Overlay, line_width: float, font_size: float) -> None:
@@ -133,7 +136,7 @@ def _shaded(overlay: Overlay) -> NDArray[np.float64]:
     measured = np.isfinite(overlay.depth)
     colours = np.where(measured[..., None], to_rgb(SCENE), to_rgb(BACKGROUND))
     for shown in overlay.objects:
-        u, v = np.rint(_project(shown.points, overlay.camera)).astype(int).T
+        u, v = np.rint(overlay.camera.project(shown.points)[:, :2]).astype(int).T
         colours[v, u] = to_rgb(OBJECT)
     brightness = AMBIENT + (1.0 - AMBIENT) * _facing(overlay.depth, overlay.camera)
     return np.where(measured[..., None], colours * brightness[..., None], colours)
@@ -178,7 +181,7 @@ def wireframe(
     hidden = np.zeros(middles.shape[:2], dtype=bool)
     for cube in unit_cubes if occluders is None else occluders:
         hidden |= _covers(cube, camera, middles)
-    pixels = _project(points, camera)
+    pixels = camera.project(points)[..., :2].astype(np.float32)
     lines = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)
     return lines[~hidden], lines[hidden]
 
@@ -188,7 +191,7 @@ def _covers(
 ) -> NDArray[np.bool_]:
     """Tell whether a body stands between the camera and each of the points (..., 3)."""
     to_cube = np.linalg.inv(cube).astype(np.float64)
-    eye = transform_points(to_cube, camera.pose[:3, 3].astype(np.float32))
+    eye = transform_points(to_cube, camera.position.astype(np.float32))
     rays = transform_points(to_cube, points) - eye
     with np.errstate(divide="ignore"):
         first, second = (-0.5 - eye) / rays, (0.5 - eye) / rays
@@ -196,9 +199,3 @@ def _covers(
     leave = np.maximum(first, second).min(axis=-1)
     covered: NDArray[np.bool_] = (enter < np.minimum(leave, 1.0) - SURFACE) & (leave > 0.0)
     return covered
-
-
-def _project(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
-    """Return the pixels (..., 2) of points (..., 3) in the world."""
-    x, y, z = np.moveaxis(transform_points(camera.world_to_camera, points), -1, 0)
-    return np.stack([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy], axis=-1)

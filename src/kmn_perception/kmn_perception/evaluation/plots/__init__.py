@@ -1,1 +1,1 @@
-"""The figures of the results, drawn without a display."""
+"""The plots of the results, drawn without a display."""

@@ -33,7 +33,7 @@ class Shown(NamedTuple):
 def draw_samples(model: KinematicModel, samples: Sequence[Shown], file: Path) -> None:
     """Draw what the canonical camera sees of the points, as observed and morphed by T^-1.
 
-    The outline is the prototype's, after morphing with the estimated gamma.
+    The contour is the prototype's, after morphing with the estimated gamma.
     """
     with figure(file, 2, len(samples), PANEL) as made:
         grid = made.subplots(2, len(samples), squeeze=False)
@@ -61,8 +61,8 @@ def _draw(
     depth = point_cloud_to_depth(drawn, observation.points, inverse)
     axes.imshow(np.where(depth > 0.0, depth, np.nan), cmap="viridis")
     for cube in model.unit_cubes(np.zeros_like(theta), gamma):
-        outline = render(cube[None], model.camera.resized(WIDTH, HEIGHT))
-        axes.contour(np.isfinite(outline), levels=[0.5], colors="#d01c1c", linewidths=0.9)
+        silhouette = render(cube[None], model.camera.resized(WIDTH, HEIGHT))
+        axes.contour(np.isfinite(silhouette), levels=[0.5], colors="#d01c1c", linewidths=0.9)
     axes.set(xticks=[], yticks=[], facecolor="#f2f2f2")
     axes.grid(False)
     axes.spines[:].set_visible(False)

@@ -1,4 +1,4 @@
-"""How all figures look."""
+"""How all plots look."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
+
+from kmn_perception.configuration.output import replacing
 
 COLOURS = {"baseline": "#d95f02", "kmn_paper": "#7570b3", "kmn": "#1b9e77"}
 LABELS = {
@@ -42,4 +44,5 @@ def figure(file: Path, rows: int, columns: int, panel: tuple[float, float]) -> I
         yield made
         canvas.draw()
         image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        image.quantize(PALETTE, dither=Image.Dither.NONE).save(file, optimize=True)
+        with replacing(file) as new:
+            image.quantize(PALETTE, dither=Image.Dither.NONE).save(new, optimize=True)

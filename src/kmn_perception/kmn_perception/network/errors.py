@@ -36,6 +36,6 @@ def errors_by_step(
     truth: NDArray[np.float64],
     steps: int,
 ) -> NDArray[np.float64]:
-    """Return the absolute errors (S, B, n + m) after 0, 1, ..., at most ``steps`` predictions."""
+    """Return the absolute errors (S, B, n + m) after 0, 1, ..., up to ``steps`` predictions."""
     values = np.stack(list(islice(values_by_step(network, observations), steps + 1)))
     return absolute_errors(network.model, values, truth)

@@ -91,7 +91,7 @@ def test_a_run_without_its_data_is_not_resumed(
     damage(resumable.with_suffix(".run"))
     line = last_line(start(resumable))
     assert line.startswith("train: the run cannot be resumed, its training data ")
-    assert "use --restart to train anew" in line
+    assert "use --restart to train from the beginning" in line
     assert not resumable.exists()
 
 

@@ -66,7 +66,7 @@ def summary(result: dict[str, Any], paper: PaperErrors) -> Rows:
 
 
 def by_visible_fraction(result: dict[str, Any]) -> Rows:
-    """Return the mean errors of all methods by how much of the object is in the image."""
+    """Return the mean errors of all methods by the visible fraction of the object."""
     methods = result["methods"]
     bins = next(iter(methods.values()))["by_visible_fraction"]
     rows = [["visible", *[f"{part['low']:g} to {part['high']:g}" for part in bins]]]

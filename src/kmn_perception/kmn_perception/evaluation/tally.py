@@ -28,7 +28,7 @@ class Tally:
         self._visible: list[float] = []
 
     def add(self, visible: float, measurement: Measurement) -> None:
-        """Add a sample of which a fraction is visible."""
+        """Add a sample with the fraction of the object that is visible."""
         self._visible.append(visible)
         self._measurements.append(measurement)
 

@@ -150,7 +150,7 @@ def find_edge(
 def _flow(
     points: NDArray[np.float64], direction: NDArray[np.float64], camera: Camera
 ) -> NDArray[np.float64]:
-    """Return by how many pixels (N, 2) points (N, 3) move in the image for each metre."""
+    """Return the motion in the image (N, 2) of points (N, 3), in pixels per metre."""
     x, y, z = points.T
     return np.column_stack(
         [

@@ -111,7 +111,7 @@ class References(NamedTuple):
 def measure(
     frame: LabelledFrame, settings: ExperimentSettings, heading: NDArray[np.float64]
 ) -> References:
-    """Measure every labelled carton of a frame of which an upright face is seen.
+    """Measure every labelled carton of a frame that shows an upright face.
 
     The table is z = 0 and gives gravity. The faces in view give yaw and planes, at right angles.
     Where the face beyond is not in view, a side is where the faces beside it end in the image.
@@ -185,8 +185,8 @@ def _sides(
     """Return place and standard deviation of the sides (5,); NaN for those that are not seen.
 
     A side is where its face is, and where the faces beside it end. One that faces the camera also
-    ends at the sides behind, whose places are known by then: this tells most of sides that are too
-    narrow for a face, or of which the sensor has rounded most off.
+    ends at the sides behind, whose places are known by then: this helps most with sides that are
+    too narrow for a face, or that the sensor has mostly rounded off.
     """
     offsets, deviations = np.full(5, np.nan), np.full(5, np.nan)
     measured: list[list[Edge]] = [

@@ -75,7 +75,7 @@ class ExperimentSettings:
     min_table
         Number of measured pixels of the table that a frame needs.
     visible
-        Objects of which a smaller share is in view do not count.
+        Objects with a smaller share in view do not count.
     match
         Minimum intersection over union of an object with the reference that it is found for.
     tight, wrong

@@ -17,10 +17,10 @@ Statistics = dict[str, Any]
 
 
 def statistics(results: Sequence[FrameResult], settings: ExperimentSettings) -> Statistics:
-    """Return all statistics; objects count of which enough is visible.
+    """Return all statistics; only objects that are visible enough count.
 
-    Sizes are of sides in view. Centre and overlap are of objects of which all sides are in view;
-    of the others the reference does not know them.
+    Sizes are of sides in view. Centre and overlap are of objects with all sides in view; of the
+    others the reference does not know them.
     """
     scores = [s for result in results for s in result.scores]
     seconds = [result.seconds for result in results]
@@ -181,10 +181,10 @@ def details(result: Statistics) -> str:
     return "\n".join(
         [
             f"Size errors by side [mm]: {sides}",
-            f"Objects of which less is visible: {hidden['found']} of {hidden['objects']} found",
+            f"Less visible objects: {hidden['found']} of {hidden['objects']} found",
             f"Sides stated as well known and wrong by far: {result['gross']}",
             f"Milliseconds of one core a frame: {times['median']:.0f} median, "
-            f"{times['max']:.0f} at most",
+            f"{times['max']:.0f} maximum",
             "Predictions of the paper's network until one changes little: "
             f"{_text(steps['real'], 1.0, 1)}, in simulation {_text(steps['simulated'], 1.0, 1)}",
             f"Standard deviations of the references: yaw {_text(own['yaw_deg']['median'], 1.0, 2)} "

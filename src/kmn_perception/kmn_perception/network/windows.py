@@ -100,7 +100,7 @@ def render_window(
     """Render the observation, morphed by the estimated parameters, in a window.
 
     The points are morphed such that the window's body, if the estimate is right, comes to lie on
-    that of the prototype: the paper's T_theta^-1 (Eq. 5), and the like for gamma.
+    that of the prototype: the paper's T_theta^-1 (Eq. 5), extended to gamma.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
 """The offline training tool: Algorithm 2 of the paper, and the training of our network by stages.
 
-Imports ``network``, ``model`` and ``configuration``.
+Imports ``network``, ``scene``, ``model``, ``configuration`` and ``command_line``.
 """

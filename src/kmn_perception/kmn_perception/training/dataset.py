@@ -98,5 +98,5 @@ def _make(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:
 def _lost(path: Path, what: str) -> RunError:
     return RunError(
         f"the run cannot be resumed, its training data {path} {what}; "
-        "put the file back, or use --restart to train anew"
+        "put the file back, or use --restart to train from the beginning"
     )

@@ -84,7 +84,8 @@ class Run:
             checkpoint: dict[str, Any] = torch.load(file, map_location=device, weights_only=True)
         except (EOFError, OSError, RuntimeError, UnpicklingError) as error:
             raise RunError(
-                f"{file} is damaged ({_first_line(error)}); use --restart to train anew"
+                f"{file} is damaged ({_first_line(error)}); "
+                "use --restart to train from the beginning"
             ) from error
         return checkpoint
 

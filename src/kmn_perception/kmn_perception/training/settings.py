@@ -43,7 +43,7 @@ class SensorSettings:
     pose_error
         Standard deviations of the error of the believed camera pose: metres, radians.
     occlusion
-        Share of the samples of which a random side is hidden.
+        Share of the samples that have a random side hidden.
     cut_height
         Points lower than a height of up to this (metres) are lost with the support plane.
     """

@@ -36,7 +36,7 @@ RULES = {
 
 @contextmanager
 def figure(file: Path, rows: int, columns: int, panel: tuple[float, float]) -> Iterator[Figure]:
-    """Make a figure of so many diagrams of a size (inches), write it to a PNG file at the end."""
+    """Yield a figure of diagrams, each of a size (inches); at the end write it to a PNG file."""
     with mpl.rc_context(RULES):
         size = columns * panel[0], rows * panel[1]
         made = Figure(size, dpi=DOTS_PER_INCH, layout="constrained")

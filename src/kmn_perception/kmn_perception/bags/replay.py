@@ -28,7 +28,7 @@ from kmn_perception.bags.rosbag2 import (
 from kmn_perception.ros.program import own_arguments, ros_session
 
 QUEUE_DEPTH = 10
-MAX_GAP = 3600.0  # recorded seconds between two messages; longer ones are a clock that was set
+MAX_GAP = 3600.0  # recorded seconds between two messages that are waited for
 DISCOVERY_PERIOD = 0.05  # seconds between two looks for a subscriber
 DISCOVERY_MARGIN = 0.5  # seconds for the subscriber to find the publishers too
 FLUSH_TIMEOUT = 5.0  # seconds for the subscribers to acknowledge the last messages
@@ -101,8 +101,8 @@ class Replay:
             last = message.stamp
             if gap > MAX_GAP:
                 self._node.get_logger().warning(
-                    f"skipping a gap of {gap / 3600.0:.1f} hours in {self._bag}: "
-                    f"the clock was set while it was recorded"
+                    f"skipping a gap of {gap / 3600.0:.1f} hours in {self._bag}; "
+                    "was the clock set while it was recorded?"
                 )
                 gap = 0.0
             due += gap / rate

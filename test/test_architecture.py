@@ -62,7 +62,7 @@ def test_every_module_stands_in_a_room(package: str) -> None:
     for name in rooms:
         folder = ROOT / "src" / package / package / name
         if folder.is_dir():
-            assert (ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""), name
+            assert ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or "", name
 
 
 @pytest.mark.parametrize("package", PACKAGES)

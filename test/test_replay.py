@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ament_index_python.packages import get_package_prefix
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -37,6 +39,7 @@ from kmn_perception.bags.replay import Replay
 from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
 
 STRING = "std_msgs/msg/String"
+REPLAY = [sys.executable, "-m", "kmn_perception", "replay"]
 PATIENCE = 20.0  # seconds; far more than anything here takes
 QUEUE_DEPTH = 100
 NO_LIMIT = QosTime(9223372036, 854775807)
@@ -228,9 +231,50 @@ def test_a_topic_that_is_not_recorded_is_refused(player: Node, talk: Path) -> No
         Replay(player, talk, topic_map={"/depth": "/a"})
 
 
+def test_a_gap_of_years_is_skipped_with_a_message(
+    player: Node,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    year = 365 * 24 * 3600 * 1000
+    said = [_said("/a", 0, "a0"), _said("/a", year, "a1"), _said("/a", year + 50, "a2")]
+    write_bag(tmp_path / "bag", {"/a": STRING}, said)
+    clock = Clock()
+    monkeypatch.setattr(replay_module, "time", clock)
+    published = [clock.now - 100.0 for _ in Replay(player, tmp_path / "bag").play()]
+    assert published == pytest.approx([0.0, 0.0, 0.050])
+    assert "skipping a gap of 8760.0 hours" in capfd.readouterr().err
+
+
+def test_the_readmes_line_replays_under_another_name(player: Node, tmp_path: Path) -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    (line,) = re.findall(
+        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
+    )
+    package, executable, bag, *arguments = line.split()
+    write_bag(
+        tmp_path / bag,
+        {"/camera/depth/points": STRING},
+        [_said("/camera/depth/points", 0, "hello")],
+    )
+    heard = listen(player, String, "/points")
+    installed = f"{get_package_prefix(package)}/lib/{package}/{executable}"
+    process = subprocess.Popen(
+        [installed, bag, *arguments],
+        cwd=tmp_path,
+        env={**os.environ, "ROS_DOMAIN_ID": str(player.context.get_domain_id())},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert spin_until(player, lambda: bool(heard)), process.communicate()[1]
+    assert heard[0].data == "hello"
+    assert process.wait(timeout=60) == 0
+
+
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "kmn_perception.bags.replay", *arguments],
+        [*REPLAY, *arguments],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
         stderr=subprocess.PIPE,
         text=True,

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import pytest
-import yaml
 from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points
@@ -40,16 +40,12 @@ def real_frame(request: pytest.FixtureRequest) -> RealFrame:
 
 def tabletop_pipeline() -> MorphPipeline:
     """Return the pipeline of morph_node for boxes on a table; nothing of it is compiled yet."""
-    return shipped_pipeline("morph_node", "morph_node_tabletop")
+    return shipped_pipeline("morph_node_tabletop")
 
 
-def shipped_pipeline(*names: str) -> MorphPipeline:
-    """Return the pipeline of morph_node with parameter files, the later over the earlier."""
-    values = {}
-    for name in names:
-        file = yaml.safe_load(resources.find("config/nodes", name).read_text())
-        values.update(file["/**"]["ros__parameters"])
-    settings = MorphNodeSettings.check(values)
+def shipped_pipeline(*files: str) -> MorphPipeline:
+    """Return the pipeline of morph_node with the parameters of files over the defaults."""
+    settings = MorphNodeSettings.check(parameter_values("morph_node", *files))
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     return MorphPipeline(estimator, settings.pipeline)
 

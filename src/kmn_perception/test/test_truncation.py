@@ -19,7 +19,7 @@ HEIGHT = 3  # column of the door's height among the parameters
 
 @cache
 def pipeline() -> MorphPipeline:
-    return shipped_pipeline("morph_node")
+    return shipped_pipeline()
 
 
 @pytest.mark.parametrize("rows", [0, 1, 3, 8])

@@ -28,6 +28,7 @@ from visualization_msgs.msg import MarkerArray
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.messages import MessageError
+from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
 from kmn_skill.execution.door_memory import DoorMemory
@@ -40,7 +41,7 @@ from kmn_skill.planning.plan import Plan
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.ros import messages
-from kmn_skill.ros.skill_node_parameters import DESCRIPTORS, SkillNodeSettings
+from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics
 
 FEEDBACK_PERIOD = 0.1  # seconds
@@ -60,9 +61,7 @@ class SkillNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
-        self._settings = settings = SkillNodeSettings.check(
-            declare_parameters(self, "skill_node", DESCRIPTORS)
-        )
+        self._settings = settings = SkillNodeSettings.check(declare_parameters(self, "skill_node"))
         robot_joints = RobotModel.load().joint_names
         self._joints = {
             "joint_states": robot_joints,
@@ -82,11 +81,15 @@ class SkillNode(Node):
         self.add_on_set_parameters_callback(self._on_parameters)
         self.get_logger().info(f"opening doors of model '{settings.model.name}'")
 
-    def destroy_node(self) -> None:
-        """Let the robot hold, and end the planner and the node."""
+    def close(self) -> None:
+        """End the goal that runs, and let the robot hold; the executor must go on meanwhile."""
         self._closing = True
         if self._worker is not None:
             self._worker.join()
+
+    def destroy_node(self) -> None:
+        """Let the robot hold, and end the planner and the node."""
+        self.close()
         self._ending.close()
         super().destroy_node()
 
@@ -252,9 +255,14 @@ class SkillNode(Node):
         A goal that runs goes on with those that it began with.
         """
         try:
-            settings = SkillNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = SkillNodeSettings.check(read_parameters(self, "skill_node", parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
         self._door.settings, self._watch.settings = settings.door, settings.states
         return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    """Run the executable ``skill_node``; stopped, it lets the robot hold and ends."""
+    return run_node("skill_node", __doc__, SkillNode, SkillNode.close)

@@ -1,0 +1,74 @@
+"""Set-up, build and ``run`` in environments and folders that are not as they would like them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def bash(command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["bash", "-euc", command],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
+    (tmp_path / "rclpy.py").write_text("raise SystemExit('another ROS')")
+    (tmp_path / "librcl.so").write_text("")
+    (tmp_path / "cuda").mkdir()
+    replay = "install/kmn_perception/lib/kmn_perception/replay"
+    ended = bash(
+        '. tools/environment.sh "$(<.venv/ros)"; echo "libraries $LD_LIBRARY_PATH"; '
+        f"set +u; . install/setup.bash; {replay} nowhere",
+        ROOT,
+        ROS_DISTRO="humble",
+        PYTHONPATH=str(tmp_path),
+        AMENT_PREFIX_PATH=str(tmp_path),
+        LD_LIBRARY_PATH=f"{tmp_path}:{tmp_path}/cuda",
+    )
+    assert "nowhere: no such bag" in ended.stderr
+    assert f"libraries {tmp_path}/cuda\n" in ended.stdout
+
+
+@pytest.mark.parametrize("name", ["Tür", "two words"])
+def test_a_checkout_where_cmake_would_fail_is_refused_at_once(name: str, tmp_path: Path) -> None:
+    tools = tmp_path / name / "tools"
+    tools.mkdir(parents=True)
+    shutil.copy(ROOT / "tools/setup.sh", tools)
+    ended = bash("tools/setup.sh nodes wheels", tools.parent)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("set-up: the path of this checkout must consist of")
+    assert str(tools.parent) in ended.stderr
+    assert not (tools.parent / ".venv").exists()
+
+
+def test_files_of_numbas_cache_are_no_sources(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    for package in ("kmn_msgs", "kmn_perception", "kmn_sim", "kmn_skill"):
+        (tmp_path / "src" / package).mkdir(parents=True)
+    for file in ("view.py", "view.fit-7.py311.nbi", "view.fit-7.py311.1.nbc"):
+        (tmp_path / "src/kmn_perception" / file).write_text("")
+    printed = bash("make --print-data-base --dry-run help", tmp_path).stdout
+    (sources,) = (line for line in printed.splitlines() if line.startswith("PYTHON_SOURCES := "))
+    assert "view.py" in sources
+    assert ".nb" not in sources
+
+
+def test_executables_are_known_before_there_is_an_environment() -> None:
+    ask = "python3 -I tools/executables.py"
+    assert bash(f"{ask} kmn_sim sim_node", ROOT).stdout == "simulation\n"
+    assert bash(f"{ask} kmn_perception replay", ROOT).stdout == "\n"
+    assert bash(f"{ask} kmn_sim replay", ROOT).returncode == 2
+    assert "kmn_skill\n    skill_node\n" in bash(ask, ROOT).stdout

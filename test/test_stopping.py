@@ -1,0 +1,70 @@
+"""Nodes that are stopped at any moment end quietly, on an idle machine and on a busy one."""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from programs import TIMEOUT, read_until, start
+
+NODES = {
+    "morph_node": ("kmn_perception", "estimating morphing parameters"),
+    "sim_node": ("kmn_sim", "simulating model"),
+    "skill_node": ("kmn_skill", "opening doors"),
+}
+TIMES = 3
+
+
+def burn() -> None:
+    while True:
+        pass
+
+
+@contextmanager
+def busy_machine(processes: int) -> Iterator[None]:
+    """Keep so many processors at work up to the end of the context."""
+    burning = [multiprocessing.Process(target=burn, daemon=True) for _ in range(processes)]
+    for process in burning:
+        process.start()
+    try:
+        yield
+    finally:
+        for process in burning:
+            process.kill()
+            process.join()
+
+
+def stop_later(process: subprocess.Popen[str], number: signal.Signals, delay: float) -> str:
+    """Stop a process after some seconds, twice as a launch file and a terminal do together."""
+    time.sleep(delay)
+    process.send_signal(number)
+    time.sleep(0.001)
+    process.send_signal(number)
+    rest, _ = process.communicate(timeout=TIMEOUT)
+    return rest
+
+
+@pytest.mark.parametrize("busy", [0, 4])
+@pytest.mark.parametrize("node", NODES)
+def test_nodes_stop_quietly_at_any_moment(node: str, busy: int, domain: int) -> None:
+    pytest.importorskip("robotic")
+    package, greeting = NODES[node]
+    moments = random.Random(busy)
+    with busy_machine(busy):
+        for turn in range(TIMES):
+            process = start([sys.executable, "-m", package, node], domain)
+            try:
+                read_until(greeting, process)
+                number = (signal.SIGINT, signal.SIGTERM)[turn % 2]
+                rest = stop_later(process, number, moments.choice([0.0, 0.01, 0.1, 1.0]))
+            finally:
+                process.kill()
+            assert (process.returncode, "Traceback" in rest) == (0, False), rest

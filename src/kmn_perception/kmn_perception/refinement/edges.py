@@ -117,7 +117,8 @@ def _add_edge(
     upwards, lowest = image.upwards, image.floor + settings.floor_margin
     noise, border = sampling.noise, sampling.border
     moment, force, totals = sums
-    line, ends = lines[edge], view.ends[body, edge]
+    line, all_ends = lines[edge], view.ends[body]
+    ends = all_ends[edge]
     along = 1 if abs(line[0]) >= abs(line[1]) else 0
     extent, width = image.inverse_depth.shape[1 - along], image.inverse_depth.shape[along]
     low, high = min(ends[along], ends[2 + along]), max(ends[along], ends[2 + along])
@@ -138,7 +139,7 @@ def _add_edge(
             or height_at(upwards, u, v, inverse_depth) < lowest
         ):
             continue
-        inwards = min(outwards, half_chord(lines, view.ends[body], faces, edge, crossing))
+        inwards = min(outwards, half_chord(lines, all_ends, faces, edge, crossing))
         strip = strip_around(
             solids, image, settings, noise.depth, body, crossing, (outwards, inwards), buffer
         )

@@ -30,6 +30,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros.stamps import seconds
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.opening import SUCCESS, DoorOpening, Feedback, Goal, Result
@@ -92,7 +93,7 @@ class SkillNode(Node):
 
     def now(self) -> float:
         """Return the present time of the node's clock, seconds."""
-        return messages.seconds(self.get_clock().now().to_msg())
+        return seconds(self.get_clock().now().to_msg())
 
     def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
         """Publish a plan as markers."""

@@ -18,11 +18,12 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import MessageError, cube_marker
 from kmn_perception.ros.stamps import duration_of, seconds, stamp_of
-from kmn_skill.execution.opening import SUCCESS, Result
+from kmn_skill.execution.goal import SUCCESS, Result
 from kmn_skill.execution.perceived_door import DoorObservation
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import Sample
 from kmn_skill.planning.kinematics import moved_cubes
+from kmn_skill.planning.layout import BASE_POSITION, HANDLE
 from kmn_skill.planning.plan import Plan
 
 PATH_WIDTH = 0.02  # metres
@@ -104,8 +105,8 @@ def markers_from_plan(
     plan: Plan, model: KinematicModel, values: NDArray[np.float64], header: Header
 ) -> MarkerArray:
     """Draw the paths of base and handle as lines, and the door as it will stand."""
-    base = np.column_stack([plan.positions[:, :2], np.zeros(len(plan.times))])
-    handle = [body.name for body in model.bodies].index(model.joints[1].body)
+    base = np.column_stack([plan.positions[:, BASE_POSITION], np.zeros(len(plan.times))])
+    handle = [body.name for body in model.bodies].index(model.joints[HANDLE].body)
     cubes = [moved_cubes(model, values, angles) for angles in plan.door]
     levers = np.array([each[handle][:3, 3] for each in cubes])
     markers = [

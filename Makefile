@@ -15,7 +15,7 @@ MSGS := install/.built-kmn_msgs
 BUILT := install/.built-python
 MSGS_SOURCES := $(shell find src/kmn_msgs -type f -not -path '*/test/*')
 PYTHON_SOURCES := colcon.meta $(shell find -L $(PYTHON_PACKAGES:%=src/%) \
-    -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' \
+    -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' -not -name '*.nb[ic]' \
     -not -path '*.egg-info*')
 TESTS := $(wildcard src/*/test) test
 
@@ -44,7 +44,7 @@ evaluate: build  ## regenerate docs/results, table and figures (half an hour; in
 .PHONY: test
 test: build lint $(READY)simulation  ## run the style checks and all tests
 	@echo "==> Testing"
-	@. install/setup.bash && .venv/bin/python -m pytest $(TESTS)
+	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m pytest $(TESTS)
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) and types (mypy)
@@ -53,6 +53,10 @@ lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) an
 	@.venv/bin/ruff format --quiet --check .
 	@.venv/bin/mypy --no-error-summary
 	@for folder in tools $(TESTS); do .venv/bin/mypy --no-error-summary $$folder || exit; done
+
+.PHONY: parameter-tables
+parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
+	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
 
 .PHONY: setup-training setup-evaluation setup-simulation setup-test
 setup-training: $(READY)training  ## install what the training needs

@@ -16,8 +16,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from graph import Graph, GraphClient
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
+from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.ros.morph_node import MorphNode
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS
 
 
 class Client(GraphClient):
@@ -105,7 +105,8 @@ def client(graph: Any, node: MorphNode) -> Client:
 @pytest.fixture
 def restored(client: Client, node: MorphNode) -> Iterator[None]:
     """Give all parameters their former values back after the test."""
-    changeable = [name for name in DESCRIPTORS if not DESCRIPTORS[name].read_only]
+    stated = load_node_parameters("morph_node")
+    changeable = [name for name in stated if not stated[name].read_only]
     values = {name: node.get_parameter(name).value for name in changeable}
     yield
     assert client.set(**values).successful

@@ -16,7 +16,7 @@ from kmn_perception.ros.node_process import NodeProcess, ProcessError
 
 def start_demo(domain: int, folder: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "kmn_perception.bags.demo", "--out", str(folder)],
+        [sys.executable, "-m", "kmn_perception", "demo_bag", "--out", str(folder)],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -68,8 +68,8 @@ def test_interrupted_it_ends_morph_node_too(
 
 
 def test_a_node_that_does_not_start_is_reported_with_its_reason(tmp_path: Path) -> None:
-    module, arguments = "kmn_perception.ros.start_morph_node", ["-p", "weights:=nowhere"]
-    started = NodeProcess(module, arguments, tmp_path / "log")
+    arguments = ["-p", "weights:=nowhere"]
+    started = NodeProcess("kmn_perception", "morph_node", arguments, tmp_path / "log")
     with started as process, pytest.raises(ProcessError) as error:
         deadline = time.monotonic() + 60.0
         while time.monotonic() < deadline:

@@ -9,23 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rcl_interfaces.msg import ParameterType
 from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.configuration.node_parameters import ParameterError, load_node_parameters
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.network.weights import WeightsError
 from kmn_perception.ros.messages import cloud_from_points
 from kmn_perception.ros.morph_node import MorphNode
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS
-from kmn_perception.ros.parameters import ParameterError
 
 NAN = float("nan")
+NAMES = list(load_node_parameters("morph_node"))
 SECONDS = count(1)  # every frame its own stamp
 
 
@@ -50,17 +49,6 @@ def view_of_box(table: bool) -> PointCloud2:
     return view_of(Camera.load("kinect_v1"), np.array([*cubes, slab]) if table else cubes)
 
 
-def test_all_parameters_are_described_and_all_numbers_have_a_range(node: MorphNode) -> None:
-    for descriptor in node.describe_parameters(list(DESCRIPTORS)):
-        assert descriptor.description
-        if descriptor.type == ParameterType.PARAMETER_DOUBLE:
-            assert len(descriptor.floating_point_range) == 1
-        elif descriptor.type == ParameterType.PARAMETER_INTEGER:
-            assert len(descriptor.integer_range) == 1
-        elif descriptor.type == ParameterType.PARAMETER_DOUBLE_ARRAY:
-            assert "numbers" in descriptor.additional_constraints
-
-
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "tolerance out of range": ({"tolerance": 2.0}, "tolerance out of range"),
     "tolerance NaN": ({"tolerance": NAN}, "tolerance out of range"),
@@ -82,11 +70,11 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_wrong_values_are_refused_with_the_reason(client: Any, node: MorphNode, case: str) -> None:
     values, text = REFUSED[case]
-    before = node.get_parameters(list(DESCRIPTORS))
+    before = node.get_parameters(NAMES)
     result = client.set(**values)
     assert not result.successful
     assert text in result.reason
-    assert node.get_parameters(list(DESCRIPTORS)) == before
+    assert node.get_parameters(NAMES) == before
     assert client.ask(view_of_door()).points_used > 1000
 
 

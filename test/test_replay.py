@@ -37,6 +37,7 @@ from kmn_perception.bags.replay import Replay
 from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
 
 STRING = "std_msgs/msg/String"
+REPLAY = [sys.executable, "-m", "kmn_perception", "replay"]
 PATIENCE = 20.0  # seconds; far more than anything here takes
 QUEUE_DEPTH = 100
 NO_LIMIT = QosTime(9223372036, 854775807)
@@ -230,7 +231,7 @@ def test_a_topic_that_is_not_recorded_is_refused(player: Node, talk: Path) -> No
 
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "kmn_perception.bags.replay", *arguments],
+        [*REPLAY, *arguments],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
         stderr=subprocess.PIPE,
         text=True,

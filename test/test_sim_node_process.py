@@ -13,7 +13,7 @@ import pytest
 
 from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
-COMMAND = [sys.executable, "-m", "kmn_sim.ros.start_sim_node"]
+COMMAND = [sys.executable, "-m", "kmn_sim", "sim_node"]
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])

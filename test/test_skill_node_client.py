@@ -25,7 +25,7 @@ pytest.importorskip("robotic")
 from door_client import CAMERA_RATE, SEED, SPEED, DoorClient  # noqa: E402
 
 TIMEOUT = 60.0  # seconds
-SIM, SKILL = "kmn_sim.ros.start_sim_node", "kmn_skill.ros.start_skill_node"
+SIM, SKILL = ("kmn_sim", "sim_node"), ("kmn_skill", "skill_node")
 WORLD = {
     "placement": "random",
     "seed": SEED,
@@ -36,7 +36,7 @@ WORLD = {
 PATIENT = {
     "use_sim_time": True,
     "max_age": 600.0,
-    "frames": 1,
+    "min_consistent_frames": 1,
     "door_timeout": 600.0,
     "state_timeout": 1.0 * SPEED,
     "start_delay": 0.3 * SPEED,
@@ -44,13 +44,15 @@ PATIENT = {
     "part_overlap": 0.4 * SPEED,
 }
 TRUTH = ("-r", "morphing_parameters:=ground_truth")
-OPEN_DOOR = [sys.executable, "-m", "kmn_skill.experiments.open_door"]
+OPEN_DOOR = [sys.executable, "-m", "kmn_skill", "open_door"]
 
 
 @contextmanager
-def program(module: str, domain: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def program(
+    executable: tuple[str, str], domain: int, *arguments: str
+) -> Iterator[subprocess.Popen[str]]:
     """Run a node as a program, at the longest up to the end of the context."""
-    process = start([sys.executable, "-m", module], domain, *arguments)
+    process = start([sys.executable, "-m", *executable], domain, *arguments)
     try:
         yield process
     finally:

@@ -14,7 +14,7 @@ from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_unti
 pytest.importorskip("robotic")
 
 
-COMMAND = [sys.executable, "-m", "kmn_skill.ros.start_skill_node"]
+COMMAND = [sys.executable, "-m", "kmn_skill", "skill_node"]
 
 
 def children(pid: int) -> list[str]:

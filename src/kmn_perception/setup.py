@@ -1,10 +1,12 @@
 """Installs the nodes, offline tools, configuration and weights of kmn_perception."""
 
+import runpy
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 PACKAGE = "kmn_perception"
+EXECUTABLES = runpy.run_path(f"{PACKAGE}/executables.py")["EXECUTABLES"]
 
 
 def shared(folder: str) -> list[tuple[str, list[str]]]:
@@ -39,19 +41,6 @@ setup(
     ],
     zip_safe=False,
     entry_points={
-        "console_scripts": [
-            f"{name} = {PACKAGE}.executables:{name}"
-            for name in (
-                "morph_node",
-                "replay",
-                "make_example_bag",
-                "demo_bag",
-                "train",
-                "evaluate",
-                "evaluate_frames",
-                "results",
-                "benchmark",
-            )
-        ],
+        "console_scripts": [f"{name} = {PACKAGE}.__main__:main" for name in EXECUTABLES],
     },
 )

@@ -1,8 +1,11 @@
 """Installs kmn_sim."""
 
+import runpy
+
 from setuptools import find_packages, setup
 
 PACKAGE = "kmn_sim"
+EXECUTABLES = runpy.run_path(f"{PACKAGE}/executables.py")["EXECUTABLES"]
 
 setup(
     name=PACKAGE,
@@ -19,16 +22,6 @@ setup(
     ],
     zip_safe=False,
     entry_points={
-        "console_scripts": [
-            f"{name} = {PACKAGE}.executables:{name}"
-            for name in (
-                "sim_node",
-                "snapshot",
-                "check_perception",
-                "check_noise",
-                "benchmark",
-                "robot_description",
-            )
-        ],
+        "console_scripts": [f"{name} = {PACKAGE}.__main__:main" for name in EXECUTABLES],
     },
 )

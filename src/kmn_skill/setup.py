@@ -1,10 +1,12 @@
 """Installs kmn_skill."""
 
+import runpy
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 PACKAGE = "kmn_skill"
+EXECUTABLES = runpy.run_path(f"{PACKAGE}/executables.py")["EXECUTABLES"]
 
 
 def shared(folder: str) -> tuple[str, list[str]]:
@@ -29,8 +31,6 @@ setup(
     ],
     zip_safe=False,
     entry_points={
-        "console_scripts": [
-            f"{name} = {PACKAGE}.executables:{name}" for name in ("skill_node", "evaluate", "demo")
-        ],
+        "console_scripts": [f"{name} = {PACKAGE}.__main__:main" for name in EXECUTABLES],
     },
 )

@@ -7,3 +7,9 @@ other; the two front doors `estimator` (one object) and `pipeline` (a frame); of
 ``evaluation``, ``visualization`` and ``experiments``; ``ros`` (the node); and on top of it ``bags``
 and ``benchmark``.
 """
+
+from pathlib import Path as _Path
+
+from kmn_perception.configuration.compile_cache import choose_compile_cache as _choose_compile_cache
+
+_choose_compile_cache(_Path(__file__).parent)

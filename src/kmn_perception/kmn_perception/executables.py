@@ -1,15 +1,14 @@
-"""The executables of the package."""
+"""The executables of the package: the one list that set-up, ``run`` and launcher read."""
 
-from __future__ import annotations
-
-from kmn_perception.command_line.launcher import executable as _executable
-
-morph_node = _executable("kmn_perception.ros.start_morph_node")
-replay = _executable("kmn_perception.bags.replay")
-make_example_bag = _executable("kmn_perception.bags.example_bag")
-demo_bag = _executable("kmn_perception.bags.demo")
-train = _executable("kmn_perception.training.train")
-evaluate = _executable("kmn_perception.evaluation.evaluate")
-evaluate_frames = _executable("kmn_perception.experiments.evaluate_frames")
-results = _executable("kmn_perception.evaluation.results")
-benchmark = _executable("kmn_perception.benchmark")
+# Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
+EXECUTABLES = {
+    "morph_node": ("kmn_perception.ros.morph_node", ""),
+    "replay": ("kmn_perception.bags.replay", ""),
+    "make_example_bag": ("kmn_perception.bags.example_bag", ""),
+    "demo_bag": ("kmn_perception.bags.demo", ""),
+    "train": ("kmn_perception.training.train", "training"),
+    "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
+    "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
+    "results": ("kmn_perception.evaluation.results", "evaluation"),
+    "benchmark": ("kmn_perception.benchmark", ""),
+}

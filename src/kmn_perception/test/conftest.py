@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import pytest
-import yaml
 from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.rendering import depth_to_points
@@ -40,11 +40,7 @@ def real_frame(request: pytest.FixtureRequest) -> RealFrame:
 
 def tabletop_pipeline() -> MorphPipeline:
     """Return the pipeline of morph_node for boxes on a table; nothing of it is compiled yet."""
-    values = {}
-    for name in ("morph_node", "morph_node_tabletop"):
-        file = yaml.safe_load(resources.find("config/nodes", name).read_text())
-        values.update(file["/**"]["ros__parameters"])
-    settings = MorphNodeSettings.check(values)
+    settings = MorphNodeSettings.check(parameter_values("morph_node", "morph_node_tabletop"))
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     return MorphPipeline(estimator, settings.pipeline)
 

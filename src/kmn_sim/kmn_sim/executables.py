@@ -1,14 +1,11 @@
-"""The executables of the package."""
+"""The executables of the package: the one list that set-up, ``run`` and launcher read."""
 
-from __future__ import annotations
-
-from kmn_perception.command_line.launcher import executable as _executable
-
-SIMULATOR = "pybullet"
-
-sim_node = _executable("kmn_sim.ros.start_sim_node", SIMULATOR)
-snapshot = _executable("kmn_sim.checks.snapshot", SIMULATOR)
-check_perception = _executable("kmn_sim.checks.check_perception", SIMULATOR)
-check_noise = _executable("kmn_sim.checks.check_noise", SIMULATOR)
-benchmark = _executable("kmn_sim.checks.benchmark", SIMULATOR)
-robot_description = _executable("kmn_sim.robot.robot_description", SIMULATOR)
+# Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
+EXECUTABLES = {
+    "sim_node": ("kmn_sim.ros.sim_node", "simulation"),
+    "snapshot": ("kmn_sim.checks.snapshot", "simulation"),
+    "check_perception": ("kmn_sim.checks.check_perception", "simulation"),
+    "check_noise": ("kmn_sim.checks.check_noise", "simulation"),
+    "benchmark": ("kmn_sim.checks.benchmark", "simulation"),
+    "robot_description": ("kmn_sim.robot.robot_description", "simulation"),
+}

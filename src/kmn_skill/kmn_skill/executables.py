@@ -1,11 +1,11 @@
-"""The executables of the package."""
+"""The executables of the package: the one list that set-up, ``run`` and launcher read."""
 
-from __future__ import annotations
-
-from kmn_perception.command_line.launcher import executable as _executable
-
-PLANNER = "robotic"
-
-skill_node = _executable("kmn_skill.ros.start_skill_node", PLANNER)
-evaluate = _executable("kmn_skill.experiments.evaluate", PLANNER)
-demo = _executable("kmn_skill.experiments.demo", PLANNER)
+# Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
+EXECUTABLES = {
+    "skill_node": ("kmn_skill.ros.skill_node", "simulation"),
+    "open_door": ("kmn_skill.experiments.open_door", "simulation"),
+    "evaluate": ("kmn_skill.experiments.evaluate", "simulation"),
+    "demo": ("kmn_skill.experiments.demo", "simulation"),
+    "plan_doors": ("kmn_skill.experiments.plan_doors", "simulation"),
+    "make_prototypes": ("kmn_skill.experiments.make_prototypes", "simulation"),
+}

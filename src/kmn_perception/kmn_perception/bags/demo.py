@@ -6,8 +6,6 @@ import argparse
 import math
 import os
 import shutil
-import signal
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,26 +13,24 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import rclpy
 from numpy.typing import NDArray
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.bags.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.bags.replay import Replay
-from kmn_perception.bags.rosbag2 import BagError
 from kmn_perception.configuration import resources
 from kmn_perception.estimator import Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.pipeline import PipelineSettings
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
-from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient, ProcessError
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient
 from kmn_perception.ros.parameters import declare_parameters
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_perception.scene.segmentation import segment
 from kmn_perception.scene.support_plane import find_support_plane, pose_above
 from kmn_perception.visualization.overlay import Overlay, ShownObject, save_pictures
@@ -170,7 +166,7 @@ def estimate_frames(
         If morph_node does not start, or ends.
     """
     answers = []
-    with NodeProcess("kmn_perception.ros.start_morph_node", node_arguments(), log) as process:
+    with NodeProcess("kmn_perception", "morph_node", node_arguments(), log) as process:
         listener = Listener(node, model, process)
         replay = Replay(node, bag, [POINTS], {POINTS: "points"})
         listener.wait_until_ready(replay)
@@ -221,8 +217,8 @@ def run(folder: Path) -> int:
     bag, log = folder / "kinect_boxes", folder / "morph_node.log"
     shutil.rmtree(bag, ignore_errors=True)
     make_example_bag(bag, RATE)
-    node = rclpy.create_node("demo", cli_args=["--ros-args", *node_arguments()])
-    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
+    node = Node("demo", cli_args=["--ros-args", *node_arguments()])
+    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node"))
     model = KinematicModel.load(settings.model)
     print(f"starting morph_node, which logs to {log}", flush=True)
     answers = estimate_frames(node, model, bag, log)
@@ -243,19 +239,6 @@ def main() -> int:
     parser.add_argument(
         "--out", type=Path, default=Path("outputs/demo"), help="folder of the bag and the pictures"
     )
-    options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends morph_node too
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    options = parser.parse_args(own_arguments())
+    with ros_session("demo_bag"):
         return 0 if run(options.out) >= REQUIRED else 1
-    except (BagError, ProcessError) as error:
-        print(f"demo_bag: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    finally:
-        rclpy.shutdown()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,20 +5,16 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
-import sys
 import time
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from kmn_perception.bags.rosbag2 import (
@@ -29,8 +25,10 @@ from kmn_perception.bags.rosbag2 import (
     read_messages,
     read_topics,
 )
+from kmn_perception.ros.program import own_arguments, ros_session
 
 QUEUE_DEPTH = 10
+MAX_GAP = 3600.0  # recorded seconds between two messages; longer ones are a clock that was set
 DISCOVERY_PERIOD = 0.05  # seconds between two looks for a subscriber
 DISCOVERY_MARGIN = 0.5  # seconds for the subscriber to find the publishers too
 FLUSH_TIMEOUT = 5.0  # seconds for the subscribers to acknowledge the last messages
@@ -66,7 +64,7 @@ class Replay:
         topic_map = topic_map or {}
         recorded = read_topics(bag)
         check_topics(bag, recorded, [*topics, *topic_map])
-        self._bag = bag
+        self._node, self._bag = node, bag
         self._publishers: dict[str, Publisher] = {}
         for name in topics or recorded:
             if message_type := find_message_type(recorded[name].type):
@@ -94,13 +92,20 @@ class Replay:
     def play(self, rate: float = 1.0) -> Iterator[Message]:
         """Publish each message when it is due, `rate` times as fast as recorded, and yield it.
 
-        The time table is that of the recording, so that delays do not add up.
+        The time table is that of the recording, so that delays do not add up. Where the recorder's
+        clock was set, the gap is skipped.
         """
-        start = time.monotonic()
-        first = None
+        due, last = time.monotonic(), None
         for message in read_messages(self._bag, self._publishers.keys()):
-            first = message.stamp if first is None else first
-            due = start + (message.stamp - first) * 1e-9 / rate
+            gap = 0.0 if last is None else (message.stamp - last) * 1e-9
+            last = message.stamp
+            if gap > MAX_GAP:
+                self._node.get_logger().warning(
+                    f"skipping a gap of {gap / 3600.0:.1f} hours in {self._bag}: "
+                    f"the clock was set while it was recorded"
+                )
+                gap = 0.0
+            due += gap / rate
             time.sleep(max(due - time.monotonic(), 0.0))
             self._publishers[message.topic].publish(message.data)
             yield message
@@ -182,19 +187,7 @@ def _run(node: Node, options: argparse.Namespace) -> None:
 
 def main() -> int:
     """Run the executable ``replay``."""
-    options = _parse(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C: just KeyboardInterrupt
-    try:
-        _run(rclpy.create_node("replay"), options)
-    except (BagError, InvalidTopicNameException) as error:
-        print(f"replay: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        pass
-    finally:
-        rclpy.shutdown()
+    options = _parse(own_arguments())
+    with ros_session("replay"), suppress(KeyboardInterrupt):  # the normal end of a loop
+        _run(Node("replay"), options)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
-import rclpy
 import torch
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
 from kmn_perception.benchmark import stages, transport
 from kmn_perception.benchmark.scene import full_cloud
@@ -21,8 +16,9 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.pipeline import MorphPipeline
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.parameters import declare_parameters
+from kmn_perception.ros.program import own_arguments, ros_session
 
 THREADS = 1  # of torch; as morph_node sets it
 
@@ -44,7 +40,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
     """Measure stages and transport with the parameters of morph_node, as written to JSON."""
-    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node", DESCRIPTORS))
+    settings = MorphNodeSettings.check(declare_parameters(node, "morph_node"))
     torch.set_num_threads(THREADS)
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)
@@ -79,18 +75,12 @@ def report(result: dict[str, Any]) -> str:
     return f"{columns(stage_rows)}\n\n{columns(transport_rows)}"
 
 
-def main() -> None:
-    """Run the executable."""
-    options = arguments(remove_ros_args(args=sys.argv)[1:])
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C: just KeyboardInterrupt
-    try:
+def main() -> int:
+    """Run the executable ``benchmark``."""
+    options = arguments(own_arguments())
+    with ros_session("benchmark"):
         result = benchmark(Node("benchmark"), options.frames)
         print(report(result))
         if options.json:
             write_json(options.json, result)
-    except KeyboardInterrupt:
-        sys.exit("benchmark: interrupted")
-    except (OSError, ParameterException, ValueError) as error:
-        sys.exit(f"benchmark: {error}")
-    finally:
-        rclpy.shutdown()
+    return 0

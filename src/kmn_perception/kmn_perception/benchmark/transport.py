@@ -10,7 +10,6 @@ import numpy as np
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
@@ -18,6 +17,7 @@ from tqdm import tqdm
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.ros.program import ros_session
 
 TOPIC = "benchmark/points"  # not `points`: nodes that run beside are left alone
 PERIOD = 0.1  # seconds
@@ -75,8 +75,11 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int) -> dict[str, f
 def publish(model: str, frames: int) -> None:
     """Publish clouds at 10 Hz as soon as somebody listens; runs in a process of its own."""
     cloud = full_cloud(KinematicModel.load(model))
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = Node("benchmark_publisher")
+    with ros_session("benchmark"):
+        _publish(Node("benchmark_publisher"), cloud, frames)
+
+
+def _publish(node: Node, cloud: PointCloud2, frames: int) -> None:
     publisher = node.create_publisher(PointCloud2, TOPIC, QoSProfile(depth=1))
     deadline = time.monotonic() + DISCOVERY_TIMEOUT
     while not publisher.get_subscription_count() and time.monotonic() < deadline:
@@ -89,4 +92,3 @@ def publish(model: str, frames: int) -> None:
         publisher.publish(cloud)
         due += PERIOD
     time.sleep(FLUSH)
-    rclpy.shutdown()

@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-import yaml
 from numpy.typing import NDArray
 
-from kmn_perception.configuration import resources
+from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
 from kmn_perception.experiments.baselines import BASELINES
 from kmn_perception.experiments.labelled_frame import LabelledFrame
@@ -30,7 +29,7 @@ from kmn_perception.pipeline import MorphPipeline, NoCameraPoseError, ObjectEsti
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 
 REPETITIONS = 3  # of a frame, for its time
-PARAMETER_FILES = ("morph_node", "morph_node_tabletop")  # the later overrides the earlier
+PARAMETER_FILE = "morph_node_tabletop"
 
 
 class FrameResult(NamedTuple):
@@ -70,11 +69,7 @@ class FrameResult(NamedTuple):
 def load_pipeline() -> MorphPipeline:
     """Return the pipeline that morph_node runs with the tabletop parameters, warmed up."""
     torch.set_num_threads(1)
-    values = {}
-    for name in PARAMETER_FILES:
-        file = yaml.safe_load(resources.find("config/nodes", name).read_text(encoding="utf-8"))
-        values.update(file["/**"]["ros__parameters"])
-    settings = MorphNodeSettings.check(values)
+    settings = MorphNodeSettings.check(parameter_values("morph_node", PARAMETER_FILE))
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()

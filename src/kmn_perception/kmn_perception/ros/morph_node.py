@@ -35,7 +35,8 @@ from kmn_perception.ros.messages import (
     points_from_cloud,
     points_from_depth,
 )
-from kmn_perception.ros.morph_node_parameters import DESCRIPTORS, MorphNodeSettings
+from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import REPORT_PERIOD, ThrottledWarnings, report_periodically
 from kmn_perception.ros.sensor_watch import SensorWatch
@@ -107,7 +108,7 @@ class MorphNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("morph_node", **options)
-        settings = MorphNodeSettings.check(declare_parameters(self, "morph_node", DESCRIPTORS))
+        settings = MorphNodeSettings.check(declare_parameters(self, "morph_node"))
         self._active = Active(settings, _load(settings))
         self._statistics = FrameStatistics()
         self._sensor = SensorWatch(REPORT_PERIOD)
@@ -268,7 +269,7 @@ class MorphNode(Node):
         """Take over changed parameters together, or refuse them with the reason."""
         before, pipeline = self._active
         try:
-            settings = MorphNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = MorphNodeSettings.check(read_parameters(self, "morph_node", parameters))
             if (settings.model, settings.weights) != (before.model, before.weights):
                 pipeline = _load(settings)
         except (OSError, ValueError) as error:
@@ -293,3 +294,8 @@ def _load(settings: MorphNodeSettings) -> MorphPipeline:
     pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()
     return pipeline
+
+
+def main() -> int:
+    """Run the executable ``morph_node``; being stopped is its normal end."""
+    return run_node("morph_node", __doc__, MorphNode)

@@ -32,15 +32,15 @@ class NoAnswerError(ProcessError):
 
 
 class NodeProcess:
-    """Runs the module of a node with ROS arguments; it writes to ``log``."""
+    """Runs the executable of a node with ROS arguments; it writes to ``log``."""
 
-    def __init__(self, module: str, arguments: Sequence[str], log: Path) -> None:
-        self._module, self._arguments, self._log = module, list(arguments), log
+    def __init__(self, package: str, executable: str, arguments: Sequence[str], log: Path) -> None:
+        self._executable, self._log = executable, log
+        self._command = [sys.executable, "-m", package, executable, "--ros-args", *arguments]
 
     def __enter__(self) -> NodeProcess:
-        command = [sys.executable, "-m", self._module, "--ros-args", *self._arguments]
         with self._log.open("wb") as output:
-            self._process = subprocess.Popen(command, stdout=output, stderr=output)
+            self._process = subprocess.Popen(self._command, stdout=output, stderr=output)
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -56,7 +56,7 @@ class NodeProcess:
         if self._process.poll() is not None:
             last = "\n".join(self._log.read_text(errors="replace").splitlines()[-LOG_LINES:])
             raise ProcessError(
-                f"{self._module} ended with exit code {self._process.returncode}:\n{last}"
+                f"{self._executable} ended with exit code {self._process.returncode}:\n{last}"
             )
 
 

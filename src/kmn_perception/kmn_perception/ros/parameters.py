@@ -1,9 +1,10 @@
-"""What the parameters of all nodes share: how they are described, declared, read and set."""
+"""What the parameters of all nodes share: how they are declared, read and set."""
 
 from __future__ import annotations
 
+import difflib
 from array import array
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -12,78 +13,65 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.node_parameters import (
+    NodeParameter,
+    check_values,
+    load_node_parameters,
+)
 
 Settings = TypeVar("Settings")
 
 
-class ParameterError(ValueError):
-    """Parameters that are wrong; the text names them and what was expected."""
+def declare_parameters(node: Node, stated: str) -> dict[str, Any]:
+    """Declare parameters as they are stated, and return their values; warn of foreign ones.
 
-
-def anything(
-    description: str, constraints: str = "", read_only: bool = False
-) -> ParameterDescriptor:
-    """Describe a parameter of which only the type is fixed."""
-    return ParameterDescriptor(
-        description=description, additional_constraints=constraints, read_only=read_only
-    )
-
-
-def choice(
-    description: str, choices: Collection[str], read_only: bool = False
-) -> ParameterDescriptor:
-    """Describe a text that is one of some; `check_choice` checks it."""
-    return anything(description, " or ".join(choices), read_only)
-
-
-def real(description: str, low: float, high: float, read_only: bool = False) -> ParameterDescriptor:
-    """Describe a number within [low, high]."""
-    limits = FloatingPointRange(from_value=low, to_value=high)
-    return ParameterDescriptor(
-        description=description, floating_point_range=[limits], read_only=read_only
-    )
-
-
-def whole(description: str, low: int, high: int) -> ParameterDescriptor:
-    """Describe a whole number within [low, high]."""
-    limits = IntegerRange(from_value=low, to_value=high, step=1)
-    return ParameterDescriptor(description=description, integer_range=[limits])
-
-
-def declare_parameters(
-    node: Node, file: str, descriptors: Mapping[str, ParameterDescriptor]
-) -> dict[str, Any]:
-    """Declare parameters with the defaults of a file in ``config/nodes``, and return their values.
+    Parameters
+    ----------
+    stated
+        Name of the node whose parameters they are, see `load_node_parameters`.
 
     Raises
     ------
-    ParameterException
-        If the user's value of a parameter is of another type or out of its range.
+    ParameterException, ParameterError
+        If the user's value of a parameter is of another type, or not valid.
     """
-    section = Section.load(resources.find("config/nodes", file))
-    defaults = section.section("/**").section("ros__parameters")
-    defaults.allow(descriptors)
     node.declare_parameters(
-        "", [(name, defaults.values[name], descriptors[name]) for name in descriptors]
+        "",
+        [
+            (name, parameter.default, _descriptor(parameter))
+            for name, parameter in load_node_parameters(stated).items()
+        ],
     )
-    return read_parameters(node, descriptors)
+    for text in foreign_parameters(node):
+        node.get_logger().warning(text)
+    return read_parameters(node, stated)
 
 
-def read_parameters(
-    node: Node, names: Collection[str], changes: Sequence[Parameter] = ()
-) -> dict[str, Any]:
-    """Return the values of parameters by name, as they are or would be after some changes."""
-    values = {name: node.get_parameter(name).value for name in names}
+def read_parameters(node: Node, stated: str, changes: Sequence[Parameter] = ()) -> dict[str, Any]:
+    """Return the values of parameters by name, as they are or would be after some changes.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not valid.
+    """
+    values = {name: node.get_parameter(name).value for name in load_node_parameters(stated)}
     values.update((change.name, change.value) for change in changes if change.name in values)
-    return {name: list(v) if isinstance(v, array) else v for name, v in values.items()}
+    values = {name: list(v) if isinstance(v, array) else v for name, v in values.items()}
+    check_values(stated, values)
+    return values
 
 
-def check_choice(name: str, value: str, choices: Collection[str]) -> None:
-    """Raise a `ParameterError` if a value is none of its choices."""
-    if value not in choices:
-        raise ParameterError(f"'{name}' must be one of {', '.join(choices)}, found '{value}'")
+def foreign_parameters(node: Node) -> list[str]:
+    """Return a warning for each parameter that a user has given and the node does not have."""
+    known = list(node.get_parameters_by_prefix(""))
+    texts = []
+    for name in node._parameter_overrides:  # rclpy tells them to nobody else
+        if not node.has_parameter(name):
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            texts.append(f"there is no parameter '{name}', its value is ignored{hint}")
+    return texts
 
 
 def pick(kind: type[Settings], values: Mapping[str, Any], prefix: str = "") -> Settings:
@@ -98,3 +86,19 @@ def request_to_set(values: Mapping[str, Any]) -> SetParametersAtomically.Request
     return SetParametersAtomically.Request(
         parameters=[Parameter(name, value=v).to_parameter_msg() for name, v in values.items()]
     )
+
+
+def _descriptor(parameter: NodeParameter) -> ParameterDescriptor:
+    """Return what ROS can be told of a parameter."""
+    descriptor = ParameterDescriptor(
+        description=parameter.description, read_only=parameter.read_only
+    )
+    if parameter.bounds is None:
+        descriptor.additional_constraints = parameter.range
+    elif parameter.type == "int":
+        first, last = map(int, parameter.bounds)
+        descriptor.integer_range = [IntegerRange(from_value=first, to_value=last, step=1)]
+    else:
+        low, high = parameter.bounds
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+    return descriptor

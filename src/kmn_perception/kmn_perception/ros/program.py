@@ -1,100 +1,106 @@
-"""Programs that communicate by ROS: they end without a traceback, and say why in one line."""
+"""Programs that communicate by ROS: they end without a traceback, and say why in one line.
+
+The only place that initialises rclpy, and that looks at signals.
+"""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger_level, set_logger_level
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions, install_signal_handlers
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from kmn_perception.ros.node_process import ProcessError
 
+EXPECTED = (OSError, ValueError, ParameterException, ProcessError)
+ROS_ARGUMENTS, END_OF_ROS_ARGUMENTS = "--ros-args", "--"
 
-def run_node(name: str, make_node: Callable[[], Node], has_last_words: bool = False) -> int:
-    """Run a node until it is stopped, and return the exit status; being stopped is 0.
 
-    Parameters
-    ----------
-    name
-        Of the program, for the one line that says why it cannot start.
-    make_node
-        Makes the node; its errors are of `OSError`, `ValueError` or `ParameterException`.
-    has_last_words
-        The node publishes when it is destroyed. The handlers of rclpy, which are quicker, would
-        end all communication before that.
+def split_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Split a command line into a program's own arguments and those of ROS.
+
+    Those of ROS stand between ``--ros-args`` and ``--`` or the end. rclpy would also take any own
+    argument of the form ``A:=B`` for a remapping.
     """
-    try:
-        if has_last_words:
-            for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
-                signal.signal(number, signal.default_int_handler)
-        try:
-            _init()
-            node = make_node()
-        except (OSError, ValueError, ParameterException) as error:
-            print(f"{name}: {error}", file=sys.stderr)
-            return 1
-        if not has_last_words:
-            install_signal_handlers(SignalHandlerOptions.ALL)
-        _spin(node)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        try_shutdown()
-    return 0
+    own: list[str] = []
+    ros: list[str] = []
+    inside = False
+    for argument in arguments:
+        if argument == ROS_ARGUMENTS:
+            inside = True
+        elif inside and argument == END_OF_ROS_ARGUMENTS:
+            inside = False
+        else:
+            (ros if inside else own).append(argument)
+    return own, [ROS_ARGUMENTS, *ros] if ros else []
+
+
+def own_arguments() -> list[str]:
+    """Return the arguments of the running program without those of ROS."""
+    return split_arguments(sys.argv[1:])[0]
 
 
 @contextmanager
 def ros_session(name: str) -> Iterator[None]:
     """Communicate up to the end of a context; an expected error ends the program.
 
+    Being terminated ends the context, too, and with it the nodes that were started in it.
+
     Parameters
     ----------
     name
         Of the program, for the line that says what is wrong.
     """
+    signal.signal(signal.SIGTERM, _exit)
     try:
-        _init()
+        _init(split_arguments(sys.argv[1:])[1])
         yield
-    except (OSError, ValueError, ProcessError) as error:
+    except EXPECTED as error:
         print(f"{name}: {error}", file=sys.stderr)
         sys.exit(1)
     finally:
         try_shutdown()
 
 
-def _init() -> None:
+def _exit(number: int, frame: FrameType | None) -> None:
+    sys.exit(128 + number)
+
+
+def _init(arguments: list[str]) -> None:
     """Begin to communicate, as the arguments of ROS have it, among them the parameter files.
 
     Raises
     ------
     ValueError
-        If an argument or a file is not as ROS expects it.
+        If an argument, a file or the environment is not as ROS expects it.
     """
+    if not any(os.environ.get(name) for name in ("HOME", "ROS_HOME", "ROS_LOG_DIR")):
+        raise ValueError("ROS has no folder to log to; set HOME or ROS_LOG_DIR")
     level = get_logger_level("rcl")
     set_logger_level("rcl", LoggingSeverity.FATAL)  # it says that something is wrong, but not what
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        reason, *_ = str(error).split(", at /")  # without the places in the sources of ROS
-        reason = reason.removeprefix("failed to initialize rcl: ")
-        raise ValueError(f"ROS cannot start: {' '.join(reason.split())}") from error
+        raise ValueError(f"ROS cannot start: {_explain(str(error))}") from error
     finally:
         set_logger_level("rcl", level)
 
 
-def _spin(node: Node) -> None:
-    try:
-        rclpy.spin(node)
-    except (ExternalShutdownException, KeyboardInterrupt):
-        pass
-    finally:
-        node.destroy_node()
+def _explain(error: str) -> str:
+    """Return an error of rcl in one line, without places in its sources, and a remedy for some."""
+    reason, *_ = error.split(", at /")
+    reason = " ".join(reason.removeprefix("failed to initialize rcl: ").split())
+    if "log directory" in reason:
+        reason += "; set ROS_LOG_DIR to a folder that can be written"
+    if reason.startswith("["):  # UnknownROSArgsError has nothing but a list
+        reason = f"unknown arguments after {ROS_ARGUMENTS}: {reason.strip('[]')}"
+    return reason

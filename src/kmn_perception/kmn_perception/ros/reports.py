@@ -30,12 +30,33 @@ class ThrottledWarnings:
             self._logger.warning(text)
 
 
+class NameWatch:
+    """Notices other nodes of a node's name, whose parameters and services cannot be told apart."""
+
+    def __init__(self, node: Node) -> None:
+        self._node, self._warned = node, False
+
+    def report(self) -> DiagnosticStatus:
+        """Return how many nodes have the name; that they are several is logged once."""
+        name = self._node.get_fully_qualified_name()
+        found = self._node.get_node_names_and_namespaces()
+        count = sum(f"{space.rstrip('/')}/{own}" == name for own, space in found)
+        several = count > 1
+        text = f"{count} nodes are named {name}: rename one by -r __node:=NAME or -r __ns:=/NAME"
+        if several and not self._warned:
+            self._warned = True
+            self._node.get_logger().warning(text)
+        message = text if several else "the name is unique"
+        return make_status(f"{name}: name", several, message, {"nodes_of_this_name": str(count)})
+
+
 def report_periodically(node: Node, report: Callable[[], list[DiagnosticStatus]]) -> None:
-    """Publish what ``report`` returns on ``/diagnostics`` once in a period."""
+    """Publish on ``/diagnostics`` what ``report`` returns and the name's status, periodically."""
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QUEUE_DEPTH)
+    watch = NameWatch(node)
 
     def publish() -> None:
-        message = DiagnosticArray(status=report())
+        message = DiagnosticArray(status=[*report(), watch.report()])
         message.header.stamp = node.get_clock().now().to_msg()
         publisher.publish(message)
 

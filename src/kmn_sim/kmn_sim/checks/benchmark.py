@@ -9,13 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rclpy.utilities import remove_ros_args
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.node_process import ProcessError
-from kmn_perception.ros.program import ros_session
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_sim.checks.check_perception import whole_scenes
 from kmn_sim.checks.scene_client import scene_client
 from kmn_sim.control.trajectory import Command, Waypoint
@@ -115,7 +114,7 @@ def report(result: dict[str, Any]) -> str:
 
 def main() -> int:
     """Run the executable ``benchmark``."""
-    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    options = arguments(own_arguments())
     with ros_session("benchmark"):
         result = benchmark(options.scenes)
     print(report(result))

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.utilities import remove_ros_args
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.program import ros_session
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_sim.checks.scene_client import SceneEstimate, scene_client
 from kmn_sim.sensors.kinect import NOISES
 
@@ -111,7 +110,7 @@ def summary(result: dict[str, Any]) -> str:
 
 def main() -> int:
     """Run the executable ``check_perception``."""
-    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    options = arguments(own_arguments())
     with ros_session("check_perception"):
         result = check(options)
     print(summary(result))

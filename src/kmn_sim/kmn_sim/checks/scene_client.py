@@ -126,12 +126,15 @@ def scene_client(model: KinematicModel, name: str, noise: str, seed: int) -> Ite
         processes = [
             stack.enter_context(
                 NodeProcess(
-                    module, [*parameter_arguments(parameters), "-r", alone], folder / module
+                    package,
+                    executable,
+                    [*parameter_arguments(parameters), "-r", alone],
+                    folder / executable,
                 )
             )
-            for module, parameters in (
-                ("kmn_sim.ros.start_sim_node", sim),
-                ("kmn_perception.ros.start_morph_node", morph),
+            for package, executable, parameters in (
+                ("kmn_sim", "sim_node", sim),
+                ("kmn_perception", "morph_node", morph),
             )
         ]
         node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])

@@ -22,12 +22,13 @@ from trajectory_msgs.msg import JointTrajectory
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
+from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
 from kmn_sim.control.trajectory import TrajectoryError
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.ros import messages
-from kmn_sim.ros.sim_node_parameters import DESCRIPTORS, RECORDING, SENSOR, WORLD, SimNodeSettings
+from kmn_sim.ros.sim_node_parameters import RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
 from kmn_sim.sensors.recording import Recorder
@@ -51,9 +52,7 @@ class SimNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
-        self._settings = settings = SimNodeSettings.check(
-            declare_parameters(self, "sim_node", DESCRIPTORS)
-        )
+        self._settings = settings = SimNodeSettings.check(declare_parameters(self, "sim_node"))
         self._depth_camera = self._make_camera(settings)
         self._statistics = SimulationStatistics(RobotSettings.load().names)
         self._warnings = ThrottledWarnings(self)
@@ -213,7 +212,7 @@ class SimNode(Node):
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
         try:
-            settings = SimNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = SimNodeSettings.check(read_parameters(self, "sim_node", parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if settings.differs(self._settings, WORLD):
@@ -236,3 +235,8 @@ class SimNode(Node):
         name = self.get_fully_qualified_name()
         simulated = self._runner.call(lambda simulation: simulation.time)
         return self._statistics.report(name, self._runner.achieved, simulated, self._renderer)
+
+
+def main() -> int:
+    """Run the executable ``sim_node``; being stopped is its normal end."""
+    return run_node("sim_node", __doc__, SimNode)

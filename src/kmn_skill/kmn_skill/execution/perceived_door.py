@@ -28,8 +28,8 @@ class AcceptanceSettings:
     ----------
     max_age
         Seconds that the newest may be old.
-    frames
-        So many frames in a row must be usable and agree.
+    min_consistent_frames
+        How many frames in a row must be usable and consistent.
     max_distance, max_angle
         By which handle and hinge (m), and the yaw (rad), may differ among these frames.
     max_handle_std, max_hinge_std, max_yaw_std
@@ -41,7 +41,7 @@ class AcceptanceSettings:
     """
 
     max_age: float
-    frames: int
+    min_consistent_frames: int
     max_distance: float
     max_angle: float
     max_handle_std: float
@@ -165,15 +165,16 @@ class PerceivedDoor:
         """
         settings, model = self.settings, self._model
         with self._lock:
-            kept, refused = list(self._kept)[-settings.frames :], self._refused
+            kept, refused = list(self._kept)[-settings.min_consistent_frames :], self._refused
         if not kept:
             raise refused or DoorError("none", "no morphing parameters came yet")
         _check_age(now - kept[-1].time, settings.max_age)
-        if len(kept) < settings.frames:
+        if len(kept) < settings.min_consistent_frames:
             before = f"; before: {refused}" if refused else ""
             raise DoorError(
                 "few_frames",
-                f"{len(kept)} usable frame(s) in a row, expected {settings.frames}{before}",
+                f"{len(kept)} usable frame(s) in a row, "
+                f"expected {settings.min_consistent_frames}{before}",
             )
         quantities = np.array([grasp_quantities(model, each.values) for each in kept])
         spread = np.ptp(quantities, axis=0)

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.utilities import remove_ros_args
 
 from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.program import ros_session
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
 from kmn_skill.experiments.evaluate import NOISES, random_doors
 from kmn_skill.experiments.film_strip import save_strip
@@ -84,7 +83,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def main() -> int:
     """Run the executable ``demo``."""
-    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    options = arguments(own_arguments())
     with ros_session("demo"):
         is_open = run(options, Experiment.load())
     print("the door is open" if is_open else "the door is NOT open")

@@ -107,10 +107,10 @@ class DoorSystem:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             namespace = f"/doors_{os.getpid()}"  # whatever else runs here is not disturbed
             remaps = [f"__ns:={namespace}", f"/clock:={namespace}/clock"]
-            for module, parameters, more in self._nodes():
+            for package, executable, parameters, more in self._nodes():
                 renamed = [part for text in (*remaps, *more) for part in ("-r", text)]
                 arguments = [*renamed, *parameter_arguments(parameters)]
-                process = NodeProcess(module, arguments, folder / module)
+                process = NodeProcess(package, executable, arguments, folder / executable)
                 self._processes.append(stack.enter_context(process))
             self._node = Node("doors", cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
             stack.callback(self._node.destroy_node)
@@ -155,16 +155,16 @@ class DoorSystem:
         """Let sim_node record what follows with so many pictures a second; None ends that."""
         self._set(record=str(file.absolute()) if file else "", record_rate=rate)
 
-    def _nodes(self) -> list[tuple[str, dict[str, Any], list[str]]]:
-        """Return modules, parameters and remappings of the nodes that are needed."""
+    def _nodes(self) -> list[tuple[str, str, dict[str, Any], list[str]]]:
+        """Return packages, executables, parameters and remappings of the nodes that are needed."""
         simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
-        nodes: list[tuple[str, dict[str, Any], list[str]]] = [
-            ("kmn_sim.ros.start_sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill.ros.start_skill_node", {**simulated, **self._skill_parameters()}, [door]),
+        nodes: list[tuple[str, str, dict[str, Any], list[str]]] = [
+            ("kmn_sim", "sim_node", {**self._sim, "publish_clock": True}, []),
+            ("kmn_skill", "skill_node", {**simulated, **self._skill_parameters()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
-            nodes.append(("kmn_perception.ros.start_morph_node", morph, []))
+            nodes.append(("kmn_perception", "morph_node", morph, []))
         return nodes
 
     def _skill_parameters(self) -> dict[str, float]:

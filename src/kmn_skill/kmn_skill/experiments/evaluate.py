@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.program import ros_session
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import SOURCES, DoorSystem
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.settings import MODES, Experiment
@@ -185,7 +184,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 def main() -> int:
     """Run the executable ``evaluate``."""
-    options = arguments(remove_ros_args(args=sys.argv)[1:])
+    options = arguments(own_arguments())
     with ros_session("evaluate"):
         result = tally(run(options, Experiment.load()))
     print(table(result))

@@ -1,6 +1,6 @@
 """Solve the policy for the prototype without a solution to start from, and keep the best.
 
-Run as ``make_prototypes FILE``; it writes ``config/skill/prototypes.json``.
+Run as ``./run kmn_skill make_prototypes FILE``; it writes ``config/skill/prototypes.json``.
 """
 
 from __future__ import annotations

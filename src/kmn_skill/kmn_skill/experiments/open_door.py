@@ -12,11 +12,10 @@ from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
 
 from kmn_msgs.action import OpenDoor
 from kmn_perception.ros.node_process import ProcessError
-from kmn_perception.ros.program import ros_session
+from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.execution.goal import Goal
 from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
@@ -108,13 +107,13 @@ def arguments(argv: list[str], experiment: Experiment) -> argparse.Namespace:
 def main() -> int:
     """Run the executable ``open_door``; its exit status is 0 if the door is open."""
     experiment = Experiment.load()
-    options = arguments(remove_ros_args(args=sys.argv)[1:], experiment)
+    options = arguments(own_arguments(), experiment)
     angle = options.door_angle
     if angle is None:
         angle = experiment.goal(options.mode).door_angle
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
-        signal.signal(number, signal.default_int_handler)
     with ros_session(ACTION):
+        for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
+            signal.signal(number, signal.default_int_handler)
         node = Node(ACTION)
         try:
             opener = DoorOpener(node, experiment.timeouts.server)

@@ -1,6 +1,6 @@
 """Plan for random doors without a simulator, and count how many plans pass the check.
 
-Run as ``python -m kmn_skill.experiments.plan_doors --mode pull --doors 100``.
+Run as ``./run kmn_skill plan_doors --mode pull --doors 100``.
 """
 
 from __future__ import annotations

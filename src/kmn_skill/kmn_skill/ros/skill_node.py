@@ -6,7 +6,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -28,6 +27,7 @@ from visualization_msgs.msg import MarkerArray
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.messages import MessageError
+from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
 from kmn_perception.ros.stamps import seconds
@@ -45,13 +45,13 @@ from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.ros import messages
 from kmn_skill.ros.change_warnings import ChangeWarnings
 from kmn_skill.ros.goal_client import GoalClient
-from kmn_skill.ros.skill_node_parameters import DESCRIPTORS, SkillNodeSettings
+from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics
 
 QUEUE_DEPTH = 10
 POLL_PERIOD = 0.05  # seconds
 GOAL_TIMEOUT = 10.0  # seconds in which a goal ends when the node does
-FAREWELL = 0.5  # seconds in which its client then asks for the result and gets it
+FAREWELL = 0.5  # seconds in which its client then may ask for the result
 
 
 class SkillNode(Node):
@@ -67,9 +67,7 @@ class SkillNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
-        self._settings = settings = SkillNodeSettings.check(
-            declare_parameters(self, "skill_node", DESCRIPTORS)
-        )
+        self._settings = settings = SkillNodeSettings.check(declare_parameters(self, "skill_node"))
         setup = PlanningSetup.load(settings.model)
         self._joints = {
             ROBOT: setup.robot.joint_names,
@@ -88,39 +86,29 @@ class SkillNode(Node):
         self._warnings, self._refusals = ThrottledWarnings(self), ChangeWarnings(self)
         self._busy, self._closing = False, threading.Event()
         self._worker: threading.Thread | None = None  # of the goal
-        self._executor: Executor | None = None  # that took the goal
         self._connect()
         self.add_on_set_parameters_callback(self._on_parameters)
         self.get_logger().info(f"opening doors of model '{settings.model.name}'")
 
-    def destroy_node(self) -> None:
-        """Let the robot hold, give the client of a goal its result, and end planner and node."""
+    def close(self) -> None:
+        """Let the robot hold and the client of a goal get its result.
+
+        Meanwhile the executor must go on.
+        """
         self._closing.set()
-        if self._busy and self._executor is not None:
-            with suppress(ShutdownException, ExternalShutdownException):
-                self._see_off(self._executor)
+        if self._busy:
+            deadline = time.monotonic() + GOAL_TIMEOUT
+            while self._busy and time.monotonic() < deadline:
+                time.sleep(POLL_PERIOD)
+            time.sleep(FAREWELL)
+
+    def destroy_node(self) -> None:
+        """Let the robot hold, and end the planner and the node."""
+        self._closing.set()
         if self._worker is not None:
             self._worker.join()
         self._ending.close()
         super().destroy_node()
-
-    def _see_off(self, executor: Executor) -> None:
-        """Spin until the goal has ended and its client knows: nobody else spins any more.
-
-        Raises
-        ------
-        ShutdownException, ExternalShutdownException
-            If that is not possible any more.
-        """
-        executor.spin_once(timeout_sec=0.0)  # raises, where to add a node would fail
-        executor.add_node(self)
-        deadline = time.monotonic() + GOAL_TIMEOUT
-        while self._busy and time.monotonic() < deadline:
-            executor.spin_once(timeout_sec=POLL_PERIOD)
-        deadline = time.monotonic() + FAREWELL
-        while time.monotonic() < deadline:
-            executor.spin_once(timeout_sec=POLL_PERIOD)
-        executor.remove_node(self)
 
     def now(self) -> float:
         """Return the present time of the node's clock, seconds."""
@@ -202,7 +190,7 @@ class SkillNode(Node):
     def _on_goal(self, request: OpenDoor.Goal) -> GoalResponse:
         """Accept a goal if none runs; whether it can be reached is for its result to tell."""
         if not self._busy and not self._closing.is_set():
-            self._busy, self._executor = True, self.executor
+            self._busy = True
             return GoalResponse.ACCEPT
         text = "goal rejected: another one runs, which must end or be cancelled first"
         self._statistics.reject(text)
@@ -271,10 +259,15 @@ class SkillNode(Node):
         A goal that runs goes on with those that it began with.
         """
         try:
-            settings = SkillNodeSettings.check(read_parameters(self, DESCRIPTORS, parameters))
+            settings = SkillNodeSettings.check(read_parameters(self, "skill_node", parameters))
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
         self._knowledge.door.settings = settings.door
         self._knowledge.watch.settings = settings.states
         return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    """Run the executable ``skill_node``; stopped, it lets the robot hold and ends."""
+    return run_node("skill_node", __doc__, SkillNode, SkillNode.close)

@@ -1,0 +1,123 @@
+"""The start-up path and the end of all nodes."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+from types import FrameType
+from typing import TypeVar
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+
+from kmn_perception.configuration.node_parameters import describe_parameters
+from kmn_perception.ros.parameter_files import useless_files
+from kmn_perception.ros.program import ros_session, split_arguments
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+TURNS = 10  # of the executor, for what the last words of a node bring about, as an action's result
+TURN_TIMEOUT = 1.0  # seconds
+
+SomeNode = TypeVar("SomeNode", bound=Node)
+
+
+def run_node(
+    name: str,
+    description: str | None,
+    make_node: Callable[[], SomeNode],
+    say_last_words: Callable[[SomeNode], None] = lambda node: None,
+) -> int:
+    """Run a node until it is stopped, and return the exit status; being stopped is 0.
+
+    Parameters
+    ----------
+    name
+        Of the program and of its parameters, see `load_node_parameters`.
+    description
+        What the node does, for ``--help``.
+    make_node
+        Makes the node; its errors are of `OSError`, `ValueError` or `ParameterException`.
+    say_last_words
+        Called when the node is stopped. Meanwhile, and until what it brought about is done, the
+        node communicates and its callbacks are executed.
+    """
+    own, ros = split_arguments(sys.argv[1:])
+    argparse.ArgumentParser(
+        prog=name,
+        description=description,
+        epilog=describe_parameters(name),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage=f"{name} [-h] [--ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO ...]",
+    ).parse_args(own)
+    with ros_session(name):
+        stop = _Stop()
+        node = make_node()
+        for text in useless_files(node.get_fully_qualified_name(), ros):
+            node.get_logger().warning(text)
+        stop.in_order = True
+        _serve(node, stop, say_last_words)
+    return 0
+
+
+class _Stop:
+    """The wish that a node stops, by a signal.
+
+    While the node starts, it ends at once: an exception could get lost in the libraries that are
+    at work then. Later on, the signal only wakes the one who waits: nothing is interrupted.
+    """
+
+    def __init__(self) -> None:
+        self.in_order = False
+        self._awake, self._alarm = os.pipe()
+        for number in STOPPING:  # a shell may have had them ignored
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if not self.in_order:
+            for child in multiprocessing.active_children():
+                child.terminate()
+            os._exit(0)
+        self.set()
+
+    def set(self) -> None:
+        """Wish it."""
+        os.write(self._alarm, b"!")
+
+    def wait(self) -> None:
+        """Wait until it is wished."""
+        os.read(self._awake, 1)
+
+
+def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], None]) -> None:
+    """Execute callbacks in a thread until they fail or a signal comes, and destroy the node."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    done = Future()
+
+    def spin() -> None:
+        try:
+            executor.spin_until_future_complete(done)
+        finally:
+            stop.set()
+
+    with ThreadPoolExecutor(1, thread_name_prefix="executor") as thread:
+        spinning = thread.submit(spin)
+        try:
+            stop.wait()
+            say_last_words(node)
+            for _ in range(0 if spinning.done() else TURNS):
+                turn = Event()
+                executor.create_task(turn.set)
+                turn.wait(TURN_TIMEOUT)
+        finally:
+            done.set_result(None)
+        spinning.result()  # raises what a callback raised
+    node.destroy_node()
+    executor.shutdown()

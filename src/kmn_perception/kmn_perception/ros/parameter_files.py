@@ -1,0 +1,47 @@
+"""Which of the parameter files on the command line hold something for a node."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+FILE_ARGUMENT = "--params-file"
+PARAMETERS = "ros__parameters"
+WILDCARDS = {"**": r"(/\w+)*", "*": r"/\w+"}  # of rcl, for parts of a node's full name
+
+
+def useless_files(name: str, arguments: Sequence[str]) -> list[str]:
+    """Return a warning for each file that holds nothing for the node of a fully qualified name.
+
+    Parameters
+    ----------
+    arguments
+        Those of ROS, whose files ROS has read before.
+    """
+    texts = []
+    for argument, file in zip(arguments, arguments[1:], strict=False):
+        if argument == FILE_ARGUMENT:
+            tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+            names = list(_names(tree or {}))
+            if not any(_matches(pattern, name) for pattern in names):
+                held = ", ".join(names) or "no node"
+                texts.append(f"{file} holds no parameters for {name}, but for {held}")
+    return texts
+
+
+def _names(tree: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """Yield the names, perhaps with wildcards, of the nodes that a file holds parameters for."""
+    for key, value in tree.items():
+        if key == PARAMETERS:
+            yield above
+        elif isinstance(value, Mapping):
+            yield from _names(value, f"{above}/{str(key).strip('/')}")
+
+
+def _matches(pattern: str, name: str) -> bool:
+    parts = pattern.strip("/").split("/")
+    return bool(re.fullmatch("".join(WILDCARDS.get(p, "/" + re.escape(p)) for p in parts), name))

@@ -22,9 +22,12 @@ from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.policy import Policy, pairs
 from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.timing import timed_plan
+from kmn_skill.planning.transfer import refine, transfer
 from kmn_skill.planning.world import GRASP, STEM, World
 
 DOOR = KinematicModel.load("door")
@@ -123,7 +126,10 @@ def remove(*keys: str) -> Callable[[dict[str, Any]], None]:
         (remove("planning", "pads", "left"), "planning: pads: key 'left' is missing"),
         (remove("planning", "bodies", "palm"), "planning: there is no body 'palm'"),
         (lambda v: v["gripper"].update(joint="thumb"), "must be the gripper's, 'thumb'"),
-        (lambda v: v["joints"]["base_y"].update(planned=[0.6, 0.0]), r"base_y: planned\[1\] must be"),
+        (
+            lambda v: v["joints"]["base_y"].update(planned=[0.6, 0.0]),
+            r"planned\[1\] must be",
+        ),
         (lambda v: v.update(wheels=4), "unknown key 'wheels'"),
     ],
 )
@@ -151,6 +157,31 @@ def test_columns_are_those_of_any_arm(axes: int) -> None:
     assert (robot[layout.GRIPPER], *door[[layout.HINGE, layout.HANDLE]]) == (
         "gripper", "hinge", "handle"
     )  # fmt: skip
+
+
+def weld_the_forearm(values: dict[str, Any]) -> None:
+    """Leave six axes to the arm."""
+    del values["joints"]["l_forearm_roll_joint"]
+    values["planning"]["bodies"]["forearm"]["joint"] = "l_elbow_flex_joint"
+
+
+def test_a_robot_with_six_axes_has_its_policy_plan_and_check(tmp_path: Path) -> None:
+    robot = RobotModel.load(edited("config/robots", "pr2", weld_the_forearm, tmp_path))
+    setup = PlanningSetup(DOOR, robot, SkillSettings.load())
+    theta, gamma = DOOR.split(DOOR.prototype)
+    request = PlanRequest(theta, gamma, robot.home, np.zeros(2), -0.7, OPEN_TO)
+    solutions = Prototypes.load()
+    welded = solutions.joints.index("l_forearm_roll_joint")
+    guess = transfer(np.delete(solutions.paths["pull"], welded, axis=1), DOOR, request)
+    world = World(setup, theta, gamma)
+    policy = Policy(world, request, setup.settings.planner.coarse, pairs(world))
+    assert policy.problem.nlp().getDimension() == guess.size == 20 * 12
+    path = refine(guess, request.configuration, setup.settings.planner.fine)
+    plan = timed_plan(path, request, robot, setup.settings.timing)
+    assert plan.positions.shape == (201, 10)
+    np.testing.assert_allclose(plan.door[-1], [OPEN_TO, -0.7])
+    with pytest.raises(PlanRejected, match="gripper and handle are .* mm apart"):
+        check(plan, request, world)  # its forearm is welded at another angle
 
 
 def test_the_stem_is_that_of_the_kinematic_model() -> None:

@@ -1,4 +1,4 @@
-"""What can go wrong with a goal, beside the planning."""
+"""What can go wrong with a goal, apart from planning."""
 
 from __future__ import annotations
 

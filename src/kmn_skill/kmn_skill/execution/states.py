@@ -28,8 +28,8 @@ class StateSettings:
     state_timeout
         Seconds that the newest may be old.
     max_speed, max_jump
-        Between two messages a joint moves at most by the speed (m/s, rad/s) times the time
-        between them, and the jump (m, rad); else it is another world.
+        Between two messages a joint moves by the speed (m/s, rad/s) times the time between them
+        plus the jump (m, rad), or less; otherwise the world is another one.
     """
 
     state_timeout: float

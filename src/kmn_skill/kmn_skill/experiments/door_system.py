@@ -42,13 +42,13 @@ class Patience(NamedTuple):
 
     Attributes
     ----------
-    frames
-        Of a new door, after which skill_node relies on no older one.
+    new_frames
+        Of another door, after which skill_node relies on no older one.
     skill_node
-        Parameters of skill_node, in seconds of the wall's clock.
+        Parameters of skill_node, in seconds of real time.
     """
 
-    frames: Count
+    new_frames: Count
     skill_node: dict[str, NonNegative]
 
     @classmethod
@@ -134,7 +134,7 @@ class DoorSystem:
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
         self._taken.clear()
-        frames = self._patience.frames
+        frames = self._patience.new_frames
         self._client.wait(
             lambda: self._count_since(since) >= frames, scene, "what perceives the door"
         )

@@ -6,12 +6,13 @@ import argparse
 import signal
 import sys
 import time
+from collections.abc import Callable
+from types import FrameType
 
 import rclpy
 from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
-from rclpy.task import Future
 
 from kmn_msgs.action import OpenDoor
 from kmn_perception.ros.node_process import ProcessError
@@ -32,54 +33,67 @@ class DoorOpener:
     ----------
     timeout
         Seconds in which the action's server must be there, and after which it counts as gone.
-
-    Raises
-    ------
-    ProcessError
-        If the server is not there, goes away, or rejects the goal; by all methods.
     """
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._node, self._timeout = node, timeout
         self._action = ActionClient(node, OpenDoor, ACTION)
+        self._interrupted = False
+
+    def interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Give up the goal, as the handler of a signal; a second one ends the program at once.
+
+        To raise an exception at the first one could lose an answer that was just taken.
+        """
+        if self._interrupted:
+            raise KeyboardInterrupt
+        self._interrupted = True
 
     def open(self, goal: Goal) -> OpenDoor.Result:
-        """Open the door, or give up when interrupted."""
-        if not self._action.wait_for_server(timeout_sec=self._timeout):
-            raise ProcessError(
-                f"no action server '{ACTION}' within {self._timeout:g} s, is skill_node running?"
-            )
-        narrator = Narrator()
+        """Open the door, or cancel that when interrupted.
+
+        Raises
+        ------
+        ProcessError
+            If the server is not there, goes away, or rejects the goal.
+        KeyboardInterrupt
+            If it is interrupted before there is a goal to cancel, or twice.
+        """
+        self._wait(
+            lambda: self._action.server_is_ready() or self._interrupted,
+            "no action server '{}' within {:g} s",
+        )
+        if self._interrupted:
+            raise KeyboardInterrupt
+        narrator, gone = Narrator(), "the action server '{}' is gone since {:g} s"
         sent = self._action.send_goal_async(
             OpenDoor.Goal(**goal._asdict()), lambda message: narrator.tell(message.feedback)
         )
-        interrupted = self._wait(sent)
+        self._wait(sent.done, gone)
         handle = sent.result()
         if not handle.accepted:
             raise ProcessError("the goal was rejected: another one runs, or skill_node ends")
         ended = handle.get_result_async()
-        if interrupted or self._wait(ended):
+        self._wait(lambda: ended.done() or self._interrupted, gone)
+        if not ended.done():
             print("cancelling the goal", flush=True)
             handle.cancel_goal_async()
-            self._wait(ended)
+            self._wait(ended.done, gone)
         answer = ended.result()
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise ProcessError("skill_node does not know the goal any more")
         return answer.result
 
-    def _wait(self, future: Future) -> bool:
-        """Wait for an answer; return whether that was interrupted, which does not end it."""
+    def _wait(self, done: Callable[[], bool], problem: str) -> None:
+        """Wait until something is done, as long as the server is there."""
         seen = time.monotonic()
-        while not future.done():
+        while not done():
             if self._action.server_is_ready():
                 seen = time.monotonic()
             elif time.monotonic() - seen > self._timeout:
-                raise ProcessError(f"the action server '{ACTION}' is gone, the goal has no result")
-            try:
-                rclpy.spin_once(self._node, timeout_sec=POLL_PERIOD)
-            except KeyboardInterrupt:
-                return True
-        return False
+                text = problem.format(ACTION, self._timeout)
+                raise ProcessError(f"{text}, is skill_node running?")
+            rclpy.spin_once(self._node, timeout_sec=POLL_PERIOD)
 
 
 def arguments(argv: list[str], experiment: Experiment) -> argparse.Namespace:
@@ -112,11 +126,11 @@ def main() -> int:
     if angle is None:
         angle = experiment.goal(options.mode).door_angle
     with ros_session(ACTION):
-        for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
-            signal.signal(number, signal.default_int_handler)
         node = Node(ACTION)
         try:
             opener = DoorOpener(node, experiment.timeouts.server)
+            for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have had them ignored
+                signal.signal(number, opener.interrupt)
             result = opener.open(Goal(options.handle_angle, angle))
         finally:
             node.destroy_node()

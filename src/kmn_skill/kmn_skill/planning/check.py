@@ -144,7 +144,7 @@ def _contact_error(path: NDArray[np.float64], world: World) -> float:
 def _clearance(
     path: NDArray[np.float64], unheld: slice, world: World
 ) -> tuple[float, tuple[str, str]]:
-    """Return the smallest distance (m) between what shall not touch, and the names of the two.
+    """Return the smallest distance (m) between what must not touch, and the names of the two.
 
     Parameters
     ----------

@@ -70,9 +70,9 @@ class PlanReport:
     Attributes
     ----------
     contact_error
-        Largest distance between points of gripper and handle that shall coincide.
+        Largest distance between points of gripper and handle that should coincide.
     clearance
-        Smallest distance between what shall not touch.
+        Smallest distance between what must not touch.
     handle_angle, door_angle
         To which the handle is pressed, and the door is opened at the end.
     duration

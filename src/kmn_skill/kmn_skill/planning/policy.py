@@ -21,7 +21,7 @@ COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
 
 
 class Pair(NamedTuple):
-    """Two bodies that shall not touch between two times."""
+    """Two bodies that must not touch between two times."""
 
     first: str
     second: str
@@ -39,7 +39,7 @@ class Policy:
     slices
         Configurations a phase; T is `PHASE_COUNT` times this.
     pairs
-        What shall not touch.
+        What must not touch.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Policy:
 
 
 def pairs(world: World) -> list[Pair]:
-    """Return all pairs of bodies that shall not touch."""
+    """Return all pairs of bodies that must not touch."""
     settings = world.setup.settings.policy
     panel, handle = (door_body(name) for name in world.door_bodies)
     door = [(body, panel) for body in settings.door_collisions]

@@ -70,7 +70,7 @@ class Prototypes:
         Parameters
         ----------
         door_angle
-            To which the door shall be opened; its sign tells whether to pull or to push, radians.
+            To which the door is to be opened; its sign tells whether to pull or to push, radians.
         count
             Number of guesses.
         spread

@@ -85,8 +85,8 @@ class RobotShape(NamedTuple):
     bodies
         By name.
     fingers, moving, obstacles
-        Names of bodies: those that may touch what they hold; those of the arm that may meet the
-        robot itself; those that they may meet.
+        Names of bodies: fingers may touch what they hold; moving ones, of the arm, must keep
+        clear of the robot's own obstacles.
     """
 
     rounding: NonNegative

@@ -44,13 +44,13 @@ class PolicySettings(NamedTuple):
     open_gripper
         Gripper's position before the grasp, radians.
     margin
-        Distance between what shall not touch, metres.
+        Distance between what must not touch, metres.
     weights
         Of the features, by name.
     door_collisions, handle_collisions, approach_collisions
-        Bodies of the robot that shall not touch panel or handle, the last ones before the handle.
+        Bodies of the robot that must not touch panel or handle, the last ones before the handle.
     self_collisions
-        Bodies of the arm, and those that each of them shall not touch.
+        Bodies of the arm, and those that each of them must not touch.
     """
 
     base: tuple[float, float]

@@ -19,7 +19,7 @@ def transfer(
     """Return a path (T, D) for a door, made from the prototype's.
 
     The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
-    shall turn by other angles than the prototype, or is ajar, the base also turns with it about
+    is to turn by other angles than the prototype, or is ajar, the base also turns with it about
     its hinge. What then parts the path from the present state fades out up to the pre-grasp pose.
 
     Parameters

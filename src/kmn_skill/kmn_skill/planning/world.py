@@ -25,7 +25,7 @@ PADS, CONTACTS = ("left_pad", "right_pad"), ("left_contact", "right_contact")
 TOOL, GRASP, OBJECT = "tool", "grasp", "object"
 STEM = "stem"  # that joins handle and panel
 BISECTIONS = 40  # of the gripper's angle
-MAX_ROUNDING = 0.4  # a corner's radius is at most this part of the box
+MAX_ROUNDING = 0.4  # a corner's radius is limited to this part of the box
 
 
 def door_body(name: str) -> str:

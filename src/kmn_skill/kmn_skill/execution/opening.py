@@ -30,7 +30,7 @@ from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, Pla
 from kmn_skill.planning.planner import Planner
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
-# What a camera tells of a door that the robot hides.
+# Why a door that the robot hides from the camera is not to be relied on.
 HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
 
 
@@ -147,7 +147,7 @@ class DoorOpening:
             )
 
     def _open(self, goal: Goal) -> None:
-        """Try it, again and again; raise if it did not work out."""
+        """Plan and follow, with some retries; raise if the last one fails."""
         values = self._wait_for_door()
         for retries_left in reversed(range(self._settings.retries + 1)):
             try:
@@ -164,7 +164,7 @@ class DoorOpening:
         """Return the parameters (n + m,) of the door when closed."""
         deadline = time.monotonic() + self._settings.door_timeout
         while True:
-            self._breaks = self._watch.breaks  # in which world it begins does not matter
+            self._breaks = self._watch.breaks  # until now the world may have changed
             try:
                 state = self._state()
                 self._report(PhaseName.WAIT, 0.0, state)

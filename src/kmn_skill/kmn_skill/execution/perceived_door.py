@@ -22,12 +22,12 @@ MAX_FRAMES = 100  # that are kept
 
 @dataclass(frozen=True)
 class AcceptanceSettings:
-    """What is asked of the door's parameters.
+    """What the door's parameters must fulfil to be relied on.
 
     Attributes
     ----------
     max_age
-        Seconds that the newest may be old.
+        Largest age of the newest, seconds.
     min_consistent_frames
         How many frames in a row must be usable and consistent.
     max_distance, max_angle
@@ -121,7 +121,7 @@ class PerceivedDoor:
         self._since = -math.inf  # seconds; what was seen before was another world
 
     def add(self, observation: DoorObservation) -> None:
-        """Keep an observation; one that is not usable parts those before from those after.
+        """Keep an observation; one that is not usable separates those before from those after.
 
         Raises
         ------

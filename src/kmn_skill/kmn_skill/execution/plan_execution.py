@@ -1,4 +1,4 @@
-"""Follows one plan: sends it part by part, and watches that robot and door go along."""
+"""Follows one plan: sends it part by part, and monitors that robot and door follow."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan
 
 MIN_STEP = 1e-3  # seconds between the start of a part and its first point
-SEND_AHEAD = 0.5  # of its duration before a part begins it is sent: the former one has begun then
+SEND_AHEAD = 0.5  # part of its duration; a part is sent so early, while the former one runs
 
 
 @dataclass(frozen=True)

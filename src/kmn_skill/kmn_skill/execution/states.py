@@ -26,7 +26,7 @@ class StateSettings:
     Attributes
     ----------
     state_timeout
-        Seconds that the newest may be old.
+        Largest age of the newest, seconds.
     max_speed, max_jump
         Between two messages a joint moves by the speed (m/s, rad/s) times the time between them
         plus the jump (m, rad), or less; otherwise the world is another one.
@@ -71,7 +71,7 @@ class StateWatch:
     joints
         Names of the joints of `ROBOT` and `DOOR`, for people to read.
     steady
-        A clock that is never set, seconds.
+        Returns the time of a clock that is never adjusted, seconds.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class StateWatch:
             self._changed.wait(timeout)
 
     def _difference(self, topic: str, before: Sample, after: Sample) -> str:
-        """Tell what parts two states that cannot be of one motion."""
+        """Return why two states cannot belong to one motion; empty if they can."""
         passed = after.time - before.time
         if passed < 0.0:
             return f"the time of {topic} went back by {-passed:.2f} s"

@@ -15,7 +15,7 @@ def release(world: World, request: PlanRequest, settings: SkillSettings) -> NDAr
     """Return how the hand lets go (R, D) after the start; R = 0 if it is not at the handle.
 
     It is there when it is nearer than the pre-grasp pose. The gripper opens where it is, and the
-    handle springs back; then the base drives so far that the hand draws straight back.
+    handle springs back; then the base drives the hand straight back to the pre-grasp distance.
     """
     start = request.configuration
     tool, grasp = world.poses(start[None], [TOOL, GRASP])[0]

@@ -90,8 +90,8 @@ class Solver:
         """Add some noise (m and rad) to a coarse path (T, D), the same each time.
 
         On a guess that almost fulfils the constraints the solver ends at once, before it fulfils
-        them. Between the configurations of the coarse path the noise is smooth: from a fine path
-        that trembles the first steps are wild and lead into obstacles.
+        them. The noise is interpolated with the coarse path, hence smooth: from a jagged fine path
+        the first steps are so large that they lead into obstacles.
         """
         generator = np.random.default_rng(0)
         return path + generator.normal(0.0, self._setup.settings.planner.noise, path.shape)

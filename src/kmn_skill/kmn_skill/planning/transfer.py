@@ -20,7 +20,7 @@ def transfer(
 
     The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
     is to turn by other angles than the prototype, or is ajar, the base also turns with it about
-    its hinge. What then parts the path from the present state fades out up to the pre-grasp pose.
+    its hinge. The remaining difference to the present state fades out up to the pre-grasp pose.
 
     Parameters
     ----------

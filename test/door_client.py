@@ -22,6 +22,7 @@ from graph import GraphClient
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.parameters import request_to_set
+from kmn_perception.ros.stamps import seconds
 from kmn_sim.ros.sim_node import SimNode
 
 SEED = 3  # of a door that is wholly in view
@@ -29,11 +30,6 @@ SPEED = 4.0  # simulated seconds in one second
 CAMERA_RATE = 0.5  # frames a simulated second
 SILENCE = 2.0  # seconds after which a slow machine has perceived all
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
-
-
-def seconds(message: JointState | MorphingParameters) -> float:
-    """Return the stamp of a message in seconds."""
-    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
 
 
 class DoorClient(GraphClient):
@@ -120,8 +116,10 @@ class DoorClient(GraphClient):
         """Put the robot and the door where they start, and wait until the door was seen there."""
         assert self.call(self.reset, Trigger.Request()).success
         self.joints.clear()
-        now = seconds(self.graph.wait_for(lambda: self.joints)[-1])
-        self.graph.wait_for(lambda: self.perceived and seconds(self.perceived[-1]) > now)
+        now = seconds(self.graph.wait_for(lambda: self.joints)[-1].header.stamp)
+        self.graph.wait_for(
+            lambda: self.perceived and seconds(self.perceived[-1].header.stamp) > now
+        )
 
     def wait_until_no_more_is_perceived(self) -> None:
         """Wait until what was exposed before is perceived, too."""

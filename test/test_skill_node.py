@@ -31,7 +31,7 @@ from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 # With so slow a camera and so fast a clock.
 PATIENT = {
-    "frames": 2,
+    "min_consistent_frames": 2,
     "max_age": 20.0,
     "door_timeout": 40.0,
     "state_timeout": 1.0 * SPEED,
@@ -109,7 +109,7 @@ def test_after_a_cancelled_goal_the_door_is_opened_from_there(
     system.wait(first.cancel_goal_async())
     system.result(first)
     seen = len(system.perceived)
-    system.graph.wait_for(lambda: len(system.perceived) > seen + PATIENT["frames"])
+    system.graph.wait_for(lambda: len(system.perceived) > seen + PATIENT["min_consistent_frames"])
     status, result = system.result(system.send())
     assert result.reason == ""
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import ExecutionError
-from kmn_skill.execution.plan_execution import GRIPPER, Execution, ExecutionSettings, Part, sample
+from kmn_skill.execution.plan_execution import Execution, ExecutionSettings, Part, sample
 from kmn_skill.execution.states import WorldState
 from kmn_skill.planning.plan import Phase, Plan, PlanReport
 
@@ -25,7 +25,7 @@ SETTINGS = ExecutionSettings(
 )
 BEGIN = 100.0  # seconds on the clock of the states
 START = BEGIN + SETTINGS.start_delay
-NAMES = ("base_x", "base_y", "base_yaw", *(f"arm_{i}" for i in range(7)), GRIPPER)
+NAMES = ("base_x", "base_y", "base_yaw", *(f"arm_{i}" for i in range(7)), "gripper")
 SIZES = np.linspace(-1.0, 1.0, 11)
 
 

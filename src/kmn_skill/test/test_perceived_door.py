@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.errors import DoorError
+from kmn_skill.execution.grasp_uncertainty import grasp_deviations, grasp_quantities
 from kmn_skill.execution.perceived_door import (
     AcceptanceSettings,
     DoorObservation,
     PerceivedDoor,
-    grasp_deviations,
-    grasp_quantities,
     when_closed,
 )
 from kmn_skill.planning.kinematics import moved_cubes

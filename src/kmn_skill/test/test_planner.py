@@ -14,25 +14,31 @@ import numpy as np
 import pytest
 
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.make_prototypes import HOME
 from kmn_skill.planning.check import PlanRejected, check
-from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
+from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.planning.timing import peaks
+from kmn_skill.planning.world import World
 
 Break = Callable[[Plan], Plan]
-SETTINGS = SkillSettings.load()
+SETUP, PROTOTYPES = PlanningSetup.load(KinematicModel.load("door")), Prototypes.load()
+SETTINGS, HOME = SETUP.settings, SETUP.robot.home
 
 
 def request(door_angle: float = -0.9, **changes: Any) -> PlanRequest:
-    asked = PlanRequest(np.zeros(3), np.zeros(4), np.array(HOME), np.zeros(2), -0.7, door_angle)
+    asked = PlanRequest(np.zeros(3), np.zeros(4), HOME, np.zeros(2), -0.7, door_angle)
     return replace(asked, **changes)
+
+
+def checked(plan: Plan, asked: PlanRequest, setup: PlanningSetup = SETUP) -> PlanReport:
+    return check(plan, asked, World(setup, asked.theta, asked.gamma))
 
 
 @pytest.fixture(scope="module")
 def planner() -> Iterator[Planner]:
-    with Planner() as planner:
+    with Planner(SETUP, PROTOTYPES) as planner:
         yield planner
 
 
@@ -122,17 +128,17 @@ BREAKS: dict[str, Break] = {
 @pytest.mark.parametrize("reason", BREAKS)
 def test_a_broken_plan_is_rejected_with_its_reason(plan: Plan, reason: str) -> None:
     with pytest.raises(PlanRejected, match=reason):
-        check(BREAKS[reason](plan), request())
+        checked(BREAKS[reason](plan), request())
 
 
 def test_a_plan_passes_its_check_again(plan: Plan) -> None:
-    report = check(plan, request())
+    report = checked(plan, request())
     assert report.contact_error == pytest.approx(plan.report.contact_error, abs=1e-6)
 
 
 def test_the_prototype_s_plan_does_not_pass_for_another_door(plan: Plan) -> None:
     with pytest.raises(PlanRejected, match="mm"):
-        check(plan, request(theta=np.array([0.05, 0.0, 0.1])))
+        checked(plan, request(theta=np.array([0.05, 0.0, 0.1])))
 
 
 def test_the_peaks_are_those_of_the_spline() -> None:
@@ -166,19 +172,22 @@ def test_a_cancelled_plan_ends_at_once_and_the_next_one_works(planner: Planner) 
     assert planner.plan(request(0.9)).door[-1, 0] > 0.0
 
 
+def with_limits(**limits: Any) -> PlanningSetup:
+    planner = SETTINGS.planner._replace(**limits)
+    return replace(SETUP, settings=replace(SETTINGS, planner=planner))
+
+
 def test_the_time_limit_ends_a_plan() -> None:
-    limits = SETTINGS.planner._replace(time_limit=0.2, attempt_limit=0.1)
     with (
-        Planner(replace(SETTINGS, planner=limits)) as planner,
-        pytest.raises(PlanningFailed, match=r"longer than 0\.1 s"),
+        Planner(with_limits(attempt_limit=0.1), PROTOTYPES, time_limit=0.2) as planner,
+        pytest.raises(PlanningFailed, match=r"longer than 0\.1 s; the 0\.2 s are over"),
     ):
         planner.plan(request())
 
 
 def test_a_process_that_does_not_start_is_told() -> None:
-    limits = SETTINGS.planner._replace(start_limit=0.0)
     with (
-        Planner(replace(SETTINGS, planner=limits)) as planner,
+        Planner(with_limits(start_limit=0.0), PROTOTYPES) as planner,
         pytest.raises(PlanningFailed, match="does not start"),
     ):
         planner.plan(request())

@@ -9,16 +9,16 @@ import pytest
 import robotic as ry
 
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.make_prototypes import HOME
-from kmn_skill.planning import prototypes
 from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.planning.transfer import hermite, move_base, refine, transfer
 from kmn_skill.planning.world import World
 
-MODEL, ROBOT, SETTINGS = KinematicModel.load("door"), RobotModel.load(), SkillSettings.load()
+MODEL = KinematicModel.load("door")
+SETUP, SOLUTIONS = PlanningSetup.load(MODEL), Prototypes.load().paths
+HOME = SETUP.robot.home
 THETA = np.array([0.4, -0.6, 0.8])
 ZERO = np.zeros(3), np.zeros(4)
 START = np.array([*HOME, 0.0, 0.0])
@@ -29,7 +29,7 @@ def request(mode: str, **changes: Any) -> PlanRequest:
     values: dict[str, Any] = {
         "theta": ZERO[0],
         "gamma": ZERO[1],
-        "start": np.array(HOME),
+        "start": HOME,
         "door_start": np.zeros(2),
         "handle_angle": -0.7,
         "door_angle": DOOR_ANGLES[mode],
@@ -39,9 +39,9 @@ def request(mode: str, **changes: Any) -> PlanRequest:
 
 def squared(asked: PlanRequest, path: Any) -> dict[Any, float]:
     """Return the squared features of a path by their kind; inequalities where violated."""
-    world = World(MODEL, asked.theta, asked.gamma, ROBOT, SETTINGS.grasp)
+    world = World(SETUP, asked.theta, asked.gamma)
     slices = len(path) // 4
-    policy = Policy(world, ROBOT, asked, SETTINGS.policy, slices, pairs(SETTINGS.policy, world))
+    policy = Policy(world, asked, slices, pairs(world))
     problem = policy.problem.nlp()
     features = problem.evaluate(np.reshape(path, -1))[0]
     kinds = np.array([int(kind) for kind in problem.getTypes()])
@@ -51,16 +51,16 @@ def squared(asked: PlanRequest, path: Any) -> dict[Any, float]:
 
 @pytest.mark.parametrize("mode", DOOR_ANGLES)
 def test_the_prototype_s_solution_fulfils_the_constraints(mode: str) -> None:
-    found = squared(request(mode), prototypes.load()[mode][1:])
+    found = squared(request(mode), SOLUTIONS[mode][1:])
     assert found[int(ry.OT.eq)] < 1e-2
     assert found[int(ry.OT.ineq)] < 1e-2
 
 
 @pytest.mark.parametrize("mode", DOOR_ANGLES)
 def test_moved_with_door_and_start_the_solution_has_the_same_features(mode: str) -> None:
-    solution = prototypes.load()[mode]
+    solution = SOLUTIONS[mode]
     pose = MODEL.transformation.matrix(THETA)
-    start = np.array([*move_base(np.array(HOME[:3]), pose), *HOME[3:]])
+    start = np.array([*move_base(HOME[:3], pose), *HOME[3:]])
     moved = request(mode, theta=THETA, start=start)
     before = squared(request(mode), solution[1:])
     after = squared(moved, transfer(solution, MODEL, moved))
@@ -77,7 +77,7 @@ def test_the_base_moves_as_a_pose_does() -> None:
 
 
 def test_the_transfer_begins_at_the_start_and_ends_at_the_goal() -> None:
-    solution = prototypes.load()["pull"]
+    solution = SOLUTIONS["pull"]
     asked = request("pull", theta=THETA, door_start=np.array([-0.2, -0.1]), door_angle=-0.6)
     guess = transfer(solution, MODEL, asked)
     assert len(guess) == len(solution) - 1
@@ -87,7 +87,7 @@ def test_the_transfer_begins_at_the_start_and_ends_at_the_goal() -> None:
 
 
 def test_a_handle_at_another_place_moves_the_base_with_it() -> None:
-    solution = prototypes.load()["pull"]
+    solution = SOLUTIONS["pull"]
     gamma = np.array([0.0, 0.1, 0.02, 0.05])
     guess = transfer(solution, MODEL, request("pull", gamma=gamma))
     handle = MODEL.joints[1]
@@ -97,20 +97,20 @@ def test_a_handle_at_another_place_moves_the_base_with_it() -> None:
 
 
 def test_a_wrong_target_violates_the_equalities() -> None:
-    found = squared(request("pull", door_angle=-0.5), prototypes.load()["pull"][1:])
+    found = squared(request("pull", door_angle=-0.5), SOLUTIONS["pull"][1:])
     assert found[int(ry.OT.eq)] > 1.0
 
 
 def test_a_path_through_the_door_violates_the_inequalities() -> None:
-    path = prototypes.load()["push"][1:].copy()
+    path = SOLUTIONS["push"][1:].copy()
     path[:8, 0] += 0.6
     assert squared(request("push"), path)[int(ry.OT.ineq)] > 0.1
 
 
 def test_only_near_pairs_are_kept_as_long_as_they_are_near() -> None:
-    world = World(MODEL, *ZERO, ROBOT, SETTINGS.grasp)
-    everything = pairs(SETTINGS.policy, world)
-    path = prototypes.load()["pull"][1:]
+    world = World(SETUP, *ZERO)
+    everything = pairs(world)
+    path = SOLUTIONS["pull"][1:]
     near = near_pairs(world, everything, path, 0.1)
     assert 0 < len(near) < len(everything)
     assert all(0.0 <= pair.begin < pair.end <= 4.0 for pair in near)
@@ -119,7 +119,7 @@ def test_only_near_pairs_are_kept_as_long_as_they_are_near() -> None:
 
 
 def test_a_refined_path_passes_through_the_coarse_one() -> None:
-    path = prototypes.load()["pull"][1:]
+    path = SOLUTIONS["pull"][1:]
     fine = refine(path, START, 50)
     assert fine.shape == (200, 13)
     assert fine[[49, 99, 199]] == pytest.approx(path[[4, 9, 19]])

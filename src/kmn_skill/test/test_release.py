@@ -8,19 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kmn_skill.experiments.make_prototypes import HOME
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.check import check
 from kmn_skill.planning.plan import Plan, PlanRequest
 from kmn_skill.planning.planner import Planner
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.world import World
 
-POLICY = SkillSettings.load().policy
-FIRST = PlanRequest(np.zeros(3), np.zeros(4), np.array(HOME), np.zeros(2), -0.7, -0.9)
+SETUP = PlanningSetup.load(KinematicModel.load("door"))
+POLICY = SETUP.settings.policy
+FIRST = PlanRequest(np.zeros(3), np.zeros(4), SETUP.robot.home, np.zeros(2), -0.7, -0.9)
 
 
 @pytest.fixture(scope="module")
 def planner() -> Iterator[Planner]:
-    with Planner() as planner:
+    with Planner(SETUP, Prototypes.load()) as planner:
         yield planner
 
 
@@ -42,7 +45,8 @@ def test_a_hand_at_the_handle_opens_and_draws_straight_back(
 ) -> None:
     request = stopped(plan, phase)
     found = planner.plan(request)
-    assert check(found, request).clearance == found.report.clearance
+    world = World(SETUP, request.theta, request.gamma)
+    assert check(found, request, world).clearance == found.report.clearance
     assert [each.name for each in found.phases] == ["release", "reach", "grasp", "press", "open"]
     for before, after in zip(found.phases, found.phases[1:], strict=False):
         assert before.last == after.first

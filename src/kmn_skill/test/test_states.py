@@ -12,7 +12,7 @@ from kmn_skill.execution.errors import StatesError
 from kmn_skill.execution.states import Sample, StateSettings, StateWatch
 
 SETTINGS = StateSettings(state_timeout=1.0, max_speed=4.0, max_jump=0.1)
-NAMES = ("base_x", "arm")
+JOINTS = {"joint_states": ("base_x", "arm"), "door_state": ("hinge", "handle")}
 
 
 class SteadyClock:
@@ -31,7 +31,7 @@ def clock() -> SteadyClock:
 
 @pytest.fixture
 def watch(clock: SteadyClock) -> StateWatch:
-    made = StateWatch(SETTINGS, NAMES, clock)
+    made = StateWatch(SETTINGS, JOINTS, clock)
     made.put("joint_states", Sample(10.0, np.array([1.0, 2.0])))
     made.put("door_state", Sample(10.0, np.array([-0.1, -0.2])))
     return made
@@ -49,7 +49,7 @@ def test_the_newest_state_is_that_of_robot_and_door(watch: StateWatch) -> None:
 
 
 def test_both_are_needed() -> None:
-    watch = StateWatch(SETTINGS, NAMES)
+    watch = StateWatch(SETTINGS, JOINTS)
     assert reason(watch, 0.0) == "no_states"
     watch.put("joint_states", Sample(0.0, np.zeros(2)))
     assert reason(watch, 0.0) == "no_states"

@@ -9,8 +9,7 @@ import robotic as ry
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.clearance import Box, Surface, box_distance, clearance, sample_surface
 from kmn_skill.planning.kinematics import moved_cubes
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.world import PADS, TOOL, World, boxes, door_body, surfaces
 
 VALUES = np.array([0.3, -0.5, 0.7, -0.2, 0.15, 0.02, -0.06])
@@ -23,7 +22,7 @@ def model() -> KinematicModel:
 
 @pytest.fixture(scope="module")
 def world(model: KinematicModel) -> World:
-    return World(model, *model.split(VALUES), RobotModel.load(), SkillSettings.load().grasp)
+    return World(PlanningSetup.load(model), *model.split(VALUES))
 
 
 def test_the_joints_are_those_of_joint_states_and_of_the_door(world: World) -> None:
@@ -34,14 +33,14 @@ def test_the_joints_are_those_of_joint_states_and_of_the_door(world: World) -> N
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_robot_moves_as_in_the_full_model(world: World, seed: int) -> None:
-    robot = RobotModel.load()
+    robot = world.setup.robot
     full = ry.Config()
     full.addFile(ry.raiPath(robot.source))
     full.selectJoints(list(robot.model_joints))
     positions = np.random.default_rng(seed).uniform(-0.5, 0.5, 13)
     positions[10] = abs(positions[10])
     full.setJointState(positions[:11])
-    frames = [*robot.model_joints, *robot.followers]
+    frames = [*robot.model_joints, *robot.gripper.followers]
     poses = world.poses(positions[None], frames)[0]
     for name, pose in zip(frames, poses, strict=True):
         assert pose == pytest.approx(full.getFrame(name).getTransform(), abs=1e-9)
@@ -77,8 +76,8 @@ def test_the_pads_touch_a_handle_of_its_height(world: World, model: KinematicMod
     assert tool == pytest.approx((left + right) / 2.0, abs=1e-9)
 
 
-def test_the_boxes_contain_the_surfaces() -> None:
-    robot = RobotModel.load()
+def test_the_boxes_contain_the_surfaces(world: World) -> None:
+    robot = world.setup.robot
     parts = surfaces(robot, 0.02)
     for name, box in boxes(robot).items():
         distances = box_distance(parts[name].points - box.centre, box.size)

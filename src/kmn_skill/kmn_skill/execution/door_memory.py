@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_skill.planning.layout import BASE_POSITION
+
 
 class DoorMemory:
-    """Keeps the parameters of the closed door that were last relied upon; thread-safe.
+    """Keeps the parameters of the closed door that a goal last relied on; thread-safe.
 
     Attributes
     ----------
     interrupted
-        Whether what they were relied upon for has not come to its end.
+        Whether the goal that relied on them has not been reached.
     """
 
     def __init__(self) -> None:
@@ -20,7 +22,7 @@ class DoorMemory:
         self._kept: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def keep(self, values: NDArray[np.float64], robot: NDArray[np.float64]) -> None:
-        """Keep parameters (n + m,) that were seen with the robot (11,) at some place [m, rad]."""
+        """Keep parameters (n + m,) and where the robot (J,) was when they were seen, m and rad."""
         self._kept, self.interrupted = (values, robot), True
 
     def forget(self) -> None:
@@ -33,12 +35,11 @@ class DoorMemory:
         Parameters
         ----------
         robot
-            (11,) present positions; x and y of the base first.
+            (J,) present positions.
         distance
-            Metres that it must have driven; a robot that still stands where it saw the door does
-            not hide it.
+            Metres that it must have driven; from where it saw the door it does not hide it.
         """
         if (kept := self._kept) is None:
             return None
         values, before = kept
-        return values if np.linalg.norm(robot[:2] - before[:2]) > distance else None
+        return values if np.linalg.norm((robot - before)[BASE_POSITION]) > distance else None

@@ -1,4 +1,4 @@
-"""What can go wrong with a goal, beside the planning."""
+"""What can go wrong with a goal, apart from planning."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class StatesError(SkillError):
 
 
 class ExecutionError(SkillError):
-    """RobotModel or door do not follow the plan; another attempt may help."""
+    """Robot or door do not follow the plan; another attempt may help."""
 
 
-class CancelledError(SkillError):
-    """The goal was cancelled."""
+class InterruptedGoal(SkillError):  # noqa: N818
+    """The goal was cancelled, or who pursues it ends."""

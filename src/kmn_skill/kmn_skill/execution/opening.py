@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,87 +14,24 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.parts import Joint
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.errors import (
-    CancelledError,
     DoorError,
     ExecutionError,
     GoalError,
     SkillError,
     StatesError,
 )
+from kmn_skill.execution.goal import SUCCESS, Client, Commands, Feedback, Goal, Result
 from kmn_skill.execution.perceived_door import PerceivedDoor, when_closed
-from kmn_skill.execution.plan_execution import Execution, ExecutionSettings, Part
+from kmn_skill.execution.plan_execution import Execution, ExecutionSettings
 from kmn_skill.execution.states import StateWatch, WorldState
+from kmn_skill.planning.layout import HANDLE, HINGE
+from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
-WAIT, PLAN = "wait", "plan"  # phases before those of the plan
-SUCCESS = "success"  # outcome of a goal that was reached
-# What a camera tells of a door that the robot hides.
+# Why a door that the robot hides from the camera is not to be relied on.
 HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
-
-
-class Goal(NamedTuple):
-    """Angles (rad) to which to press the handle and to open the door."""
-
-    handle_angle: float
-    door_angle: float
-
-
-class Result(NamedTuple):
-    """How a goal ended.
-
-    Attributes
-    ----------
-    outcome
-        `SUCCESS`, or a short key of what went wrong.
-    reason
-        Why not, for people to read; empty on success.
-    handle_angle, door_angle
-        Largest handle angle reached, and the door angle in the end, radians.
-    report
-        What the check of the last plan found, if there was one.
-    attempts
-        Plans that were begun.
-    tracking_error
-        Largest one, in units of the tolerances.
-    """
-
-    outcome: str
-    reason: str
-    handle_angle: float
-    door_angle: float
-    report: PlanReport | None
-    attempts: int
-    tracking_error: float
-
-
-class Feedback(NamedTuple):
-    """What is being done: phase, part of it all that is done (0 to 1), and the door's angles."""
-
-    phase: str
-    progress: float
-    handle_angle: float
-    door_angle: float
-
-
-class Commands(Protocol):
-    """What moves the robot."""
-
-    def now(self) -> float:
-        """Return the present time on the clock of the robot's states, seconds."""
-
-    def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
-        """Show a plan for a door of some morphing parameters (n + m,)."""
-
-    def send(self, part: Part) -> None:
-        """Send a part of the plan."""
-
-    def hold(self) -> None:
-        """Let the robot hold where it is."""
-
-    def tell(self, text: str) -> None:
-        """Tell people what happened."""
 
 
 @dataclass(frozen=True)
@@ -121,41 +57,53 @@ class OpeningSettings:
     hidden_distance: float
 
 
+class Knowledge(NamedTuple):
+    """What is known of the world, and kept from goal to goal.
+
+    Attributes
+    ----------
+    model
+        Kinematic model of the door.
+    door, memory
+        The door as it is seen, and as it was seen before the robot hid it.
+    watch
+        Of the states of robot and door.
+    """
+
+    model: KinematicModel
+    door: PerceivedDoor
+    memory: DoorMemory
+    watch: StateWatch
+
+
 class DoorOpening:
     """One goal, from its check to its result.
 
     Parameters
     ----------
-    model
-        Kinematic model of the door.
-    door, memory, watch
-        What is known of the door, of the door before, and of the states.
+    knowledge
+        Of the world.
     planner, commands
         What plans and what moves.
-    cancelled
-        Tells whether the goal was cancelled.
-    feedback
-        Is told what is being done.
+    client
+        Who wants the door to be opened.
+    settings, execution
+        Of the opening, and of following a plan.
     """
 
     def __init__(
         self,
-        model: KinematicModel,
-        door: PerceivedDoor,
-        memory: DoorMemory,
-        watch: StateWatch,
+        knowledge: Knowledge,
         planner: Planner,
         commands: Commands,
+        client: Client,
         settings: OpeningSettings,
         execution: ExecutionSettings,
-        cancelled: Callable[[], bool],
-        feedback: Callable[[Feedback], None],
     ) -> None:
-        self._model, self._door, self._memory, self._watch = model, door, memory, watch
-        self._planner, self._commands = planner, commands
+        self._model, self._door, self._memory, self._watch = knowledge
+        self._planner, self._commands, self._client = planner, commands, client
         self._settings, self._execution = settings, execution
-        self._cancelled, self._feedback = cancelled, feedback
-        self._breaks = watch.breaks
+        self._breaks = self._watch.breaks
         self._handle = self._hinge = math.nan
         self._plan_report: PlanReport | None = None
         self._attempts = 0
@@ -188,9 +136,9 @@ class DoorOpening:
 
     def _check(self, goal: Goal) -> None:
         """Raise if the door's joints cannot have the goal's angles."""
-        hinge, handle = self._model.joints
-        _check_angle("handle_angle", goal.handle_angle, handle)
-        _check_angle("door_angle", goal.door_angle, hinge)
+        joints = self._model.joints
+        _check_angle("handle_angle", goal.handle_angle, joints[HANDLE])
+        _check_angle("door_angle", goal.door_angle, joints[HINGE])
         if abs(goal.door_angle) <= self._settings.door_tolerance:
             raise GoalError(
                 "bad_goal",
@@ -199,7 +147,7 @@ class DoorOpening:
             )
 
     def _open(self, goal: Goal) -> None:
-        """Try it, again and again; raise if it did not work out."""
+        """Plan and follow, with some retries; raise if the last one fails."""
         values = self._wait_for_door()
         for retries_left in reversed(range(self._settings.retries + 1)):
             try:
@@ -216,10 +164,10 @@ class DoorOpening:
         """Return the parameters (n + m,) of the door when closed."""
         deadline = time.monotonic() + self._settings.door_timeout
         while True:
-            self._breaks = self._watch.breaks  # in which world it begins does not matter
+            self._breaks = self._watch.breaks  # until now the world may have changed
             try:
                 state = self._state()
-                self._report(WAIT, 0.0, state)
+                self._report(PhaseName.WAIT, 0.0, state)
                 return self._door_from(state)
             except (StatesError, DoorError):
                 if time.monotonic() > deadline:
@@ -243,7 +191,7 @@ class DoorOpening:
 
     def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:
         state = self._state()
-        self._report(PLAN, 0.0, state)
+        self._report(PhaseName.PLAN, 0.0, state)
         self._attempts += 1
         theta, gamma = self._model.split(values)
         request = PlanRequest(
@@ -255,9 +203,10 @@ class DoorOpening:
             door_angle=goal.door_angle,
         )
         try:
-            plan = self._planner.plan(request, cancelled=self._cancelled)
-        except PlanningCancelled as error:
-            raise CancelledError("cancelled", "the goal was cancelled") from error
+            plan = self._planner.plan(request, lambda: self._client.interruption() is not None)
+        except PlanningCancelled:
+            self._go_on()
+            raise
         except PlanningFailed as error:
             raise SkillError("no_plan", f"there is no plan: {error}") from error
         self._plan_report = plan.report
@@ -278,9 +227,8 @@ class DoorOpening:
             self._watch.wait(POLL_PERIOD)
 
     def _state(self) -> WorldState:
-        """Return the newest state; raise if the goal was cancelled or the world is another one."""
-        if self._cancelled():
-            raise CancelledError("cancelled", "the goal was cancelled")
+        """Return the newest state; raise if the goal ends or the world is another one."""
+        self._go_on()
         if self._watch.breaks != self._breaks:
             raise StatesError("another_world", self._watch.last_break)
         state = self._watch.newest(self._commands.now())
@@ -289,8 +237,13 @@ class DoorOpening:
             self._handle = state.handle
         return state
 
+    def _go_on(self) -> None:
+        """Raise if the goal is not wanted any more."""
+        if interruption := self._client.interruption():
+            raise interruption
+
     def _report(self, phase: str, progress: float, state: WorldState) -> None:
-        self._feedback(Feedback(phase, progress, state.handle, state.hinge))
+        self._client.feed_back(Feedback(phase, progress, state.handle, state.hinge))
 
     def _check_reached(self, goal: Goal) -> None:
         """Raise if handle or door are not where the goal has them."""

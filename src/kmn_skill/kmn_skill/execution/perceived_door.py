@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.errors import DoorError
+from kmn_skill.execution.grasp_uncertainty import YAW, grasp_deviations, grasp_quantities
 from kmn_skill.planning.kinematics import turn
+from kmn_skill.planning.layout import HINGE
 
-HANDLE, HINGE, YAW = slice(0, 3), slice(3, 5), slice(5, 6)  # of the quantities of a grasp
-STEP = 1e-6  # of the parameters, for derivatives
 MAX_FRAMES = 100  # that are kept
 
 
 @dataclass(frozen=True)
 class AcceptanceSettings:
-    """What is asked of the door's parameters.
+    """What the door's parameters must fulfil to be relied on.
 
     Attributes
     ----------
     max_age
-        Seconds that the newest may be old.
+        Largest age of the newest, seconds.
     min_consistent_frames
         How many frames in a row must be usable and consistent.
     max_distance, max_angle
@@ -79,42 +79,6 @@ class DoorObservation(NamedTuple):
     problem: str
 
 
-def grasp_quantities(model: KinematicModel, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a grasp depends on: position of the handle, of the hinge, yaw (6,) [m, rad]."""
-    theta, gamma = model.split(values)
-    hinge, handle = model.joints
-    lever = next(body for body in model.bodies if body.name == handle.body)
-    pose = model.transformation.matrix(theta)
-    points = np.array([[*lever.centre(gamma), 1.0], [*hinge.origin(gamma), 1.0]]) @ pose.T
-    yaw = model.transformation.components(theta).yaw
-    return np.array([*points[0, :3], *points[1, :2], float(yaw)])
-
-
-def grasp_deviations(
-    model: KinematicModel, values: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> tuple[float, float, float]:
-    """Return the largest standard deviations of handle (m), hinge (m) and yaw (rad).
-
-    Parameters
-    ----------
-    covariance
-        (n + m, n + m) of the values (n + m,).
-    """
-    steps = STEP * np.eye(values.size)
-    slopes = [
-        (grasp_quantities(model, values + step) - grasp_quantities(model, values - step))
-        / (2.0 * STEP)
-        for step in steps
-    ]
-    jacobian = np.array(slopes).T
-    spread = jacobian @ covariance @ jacobian.T
-    handle, hinge, yaw = (
-        math.sqrt(max(float(np.linalg.eigvalsh(spread[part, part])[-1]), 0.0))
-        for part in (HANDLE, HINGE, YAW)
-    )
-    return handle, hinge, yaw
-
-
 def when_closed(
     model: KinematicModel, values: NDArray[np.float64], hinge_angle: float
 ) -> NDArray[np.float64]:
@@ -128,7 +92,7 @@ def when_closed(
         By which it was open, radians.
     """
     theta, gamma = model.split(values)
-    shut = model.transformation.matrix(theta) @ turn(model.joints[0], gamma, -hinge_angle)
+    shut = model.transformation.matrix(theta) @ turn(model.joints[HINGE], gamma, -hinge_angle)
     closed = model.transformation.read_back(shut)
     return np.concatenate([closed, gamma])
 
@@ -157,7 +121,7 @@ class PerceivedDoor:
         self._since = -math.inf  # seconds; what was seen before was another world
 
     def add(self, observation: DoorObservation) -> None:
-        """Keep an observation; one that is not usable parts those before from those after.
+        """Keep an observation; one that is not usable separates those before from those after.
 
         Raises
         ------
@@ -270,22 +234,23 @@ class PerceivedDoor:
                 raise DoorError("covariance", "the parameters' covariance is unknown")
             return
         found = grasp_deviations(self._model, values, covariance)
-        allowed = settings.max_handle_std, settings.max_hinge_std, settings.max_yaw_std
-        for what, deviation, most in zip(("handle", "hinge", "yaw"), found, allowed, strict=True):
-            if deviation > most:
+        limits = settings.max_handle_std, settings.max_hinge_std, settings.max_yaw_std
+        for what, deviation, allowed in zip(("handle", "hinge", "yaw"), found, limits, strict=True):
+            if deviation > allowed:
                 raise DoorError(
                     "uncertain",
                     f"the standard deviation of the {what} is {deviation:.4f}, "
-                    f"expected at most {most:g} [m, rad]",
+                    f"expected at most {allowed:g} [m, rad]",
                 )
 
 
-def _check_age(age: float, most: float) -> None:
-    if age > most:
+def _check_age(age: float, max_age: float) -> None:
+    if age > max_age:
         raise DoorError(
-            "stale", f"the newest morphing parameters are {age:.2f} s old, expected {most:g} s"
+            "stale",
+            f"the newest morphing parameters are {age:.2f} s old, expected at most {max_age:g} s",
         )
-    if age < -most:
+    if age < -max_age:
         raise DoorError(
             "future",
             f"the newest morphing parameters are {-age:.2f} s ahead of the clock; "

@@ -1,4 +1,4 @@
-"""Follows one plan: sends it part by part, and watches that robot and door go along."""
+"""Follows one plan: sends it part by part, and monitors that robot and door follow."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import ExecutionError
 from kmn_skill.execution.states import WorldState
+from kmn_skill.planning.layout import BASE_POSITION, GRIPPER, HANDLE, HINGE
+from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan
 
-BASE_POSITION = ("base_x", "base_y")  # metres; the other joints are angles
-GRIPPER = "l_gripper_l_finger_joint"  # presses the handle and so never gets where it is sent
-HINGE, HANDLE = 0, 1  # of the plan's door
-PRESS, OPEN = "press", "open"  # phases in which the door follows the hand
 MIN_STEP = 1e-3  # seconds between the start of a part and its first point
-SEND_AHEAD = 0.5  # of its duration before a part begins it is sent: the former one has begun then
+SEND_AHEAD = 0.5  # part of its duration; a part is sent so early, while the former one runs
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class Execution:
         self._start = now + settings.start_delay
         self._duration = float(plan.times[-1])
         self._sent = 0.0  # seconds of the plan that were sent
-        self._tolerances = np.array([_tolerance(name, settings) for name in plan.joint_names])
+        self._tolerances = _tolerances(len(plan.joint_names), settings)
         self.tracking_error = 0.0
 
     def step(self, now: float, state: WorldState) -> Step:
@@ -166,8 +164,8 @@ class Execution:
         """Raise if the hand moves on, but handle or door does not follow."""
         desired = sample(self._plan.times, self._plan.door, elapsed)
         watched = {
-            PRESS: ("handle", desired[HANDLE], state.handle, self._settings.handle_slip),
-            OPEN: ("door", desired[HINGE], state.hinge, self._settings.door_slip),
+            PhaseName.PRESS: ("handle", desired[HANDLE], state.handle, self._settings.handle_slip),
+            PhaseName.OPEN: ("door", desired[HINGE], state.hinge, self._settings.door_slip),
         }
         if phase not in watched:
             return
@@ -190,7 +188,9 @@ def sample(
     return row
 
 
-def _tolerance(joint: str, settings: ExecutionSettings) -> float:
-    if joint == GRIPPER:
-        return float("inf")
-    return settings.position_tolerance if joint in BASE_POSITION else settings.angle_tolerance
+def _tolerances(count: int, settings: ExecutionSettings) -> NDArray[np.float64]:
+    """Return the largest tracking errors (J,) of the robot's joints, m and rad."""
+    tolerances = np.full(count, settings.angle_tolerance)
+    tolerances[BASE_POSITION] = settings.position_tolerance
+    tolerances[GRIPPER] = np.inf  # it presses the handle and so never gets where it is sent
+    return tolerances

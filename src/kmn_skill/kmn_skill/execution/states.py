@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import StatesError
+from kmn_skill.planning.layout import HANDLE, HINGE
 
-# What does not jump: a handle that is let go springs back faster than anything drives it.
-STEADY = {"joint_states": slice(None), "door_state": slice(0, 1)}
+ROBOT, DOOR = "joint_states", "door_state"
+# Joints that do not jump: a handle that is let go springs back faster than anything drives it.
+STEADY = {ROBOT: slice(None), DOOR: slice(HINGE, HINGE + 1)}
 
 
 @dataclass(frozen=True)
@@ -24,10 +26,10 @@ class StateSettings:
     Attributes
     ----------
     state_timeout
-        Seconds that the newest may be old.
+        Largest age of the newest, seconds.
     max_speed, max_jump
-        Between two messages a joint moves at most by the speed (m/s, rad/s) times the time
-        between them, and the jump (m, rad); else it is another world.
+        Between two messages a joint moves by the speed (m/s, rad/s) times the time between them
+        plus the jump (m, rad), or less; otherwise the world is another one.
     """
 
     state_timeout: float
@@ -50,7 +52,7 @@ class WorldState(NamedTuple):
     time
         Of the robot's positions, seconds.
     robot
-        (11,) base, arm and gripper [m, rad].
+        (J,) base, arm and gripper [m, rad].
     hinge, handle
         Angles of the door, radians.
     """
@@ -66,10 +68,10 @@ class StateWatch:
 
     Parameters
     ----------
-    joint_names
-        Names of the robot's joints, for people to read.
+    joints
+        Names of the joints of `ROBOT` and `DOOR`, for people to read.
     steady
-        A clock that is never set, seconds.
+        Returns the time of a clock that is never adjusted, seconds.
 
     Attributes
     ----------
@@ -84,18 +86,18 @@ class StateWatch:
     def __init__(
         self,
         settings: StateSettings,
-        joint_names: Sequence[str],
+        joints: Mapping[str, Sequence[str]],
         steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self.settings, self._steady = settings, steady
-        self._names = {"joint_states": tuple(joint_names), "door_state": ("hinge", "handle")}
+        self._names = joints
         self._newest: dict[str, Sample] = {}
         self._received: dict[str, float] = {}
         self._changed = threading.Condition()
         self.breaks, self.last_break = 0, ""
 
     def put(self, topic: str, sample: Sample) -> None:
-        """Take a state of ``joint_states`` or ``door_state``."""
+        """Take a state of `ROBOT` or `DOOR`."""
         with self._changed:
             before = self._newest.get(topic)
             if before is not None and (text := self._difference(topic, before, sample)):
@@ -132,8 +134,8 @@ class StateWatch:
                         f"{topic} is {age:.2f} s old by its stamp, expected at most {timeout:g} s; "
                         "do the nodes share a clock (use_sim_time)?",
                     )
-            robot, door = self._newest["joint_states"], self._newest["door_state"]
-        return WorldState(robot.time, robot.positions, *map(float, door.positions))
+            robot, door = self._newest[ROBOT], self._newest[DOOR].positions
+        return WorldState(robot.time, robot.positions, float(door[HINGE]), float(door[HANDLE]))
 
     def wait(self, timeout: float) -> None:
         """Wait until a state comes, but no longer than so many seconds."""
@@ -141,7 +143,7 @@ class StateWatch:
             self._changed.wait(timeout)
 
     def _difference(self, topic: str, before: Sample, after: Sample) -> str:
-        """Tell what parts two states that cannot be of one motion."""
+        """Return why two states cannot belong to one motion; empty if they can."""
         passed = after.time - before.time
         if passed < 0.0:
             return f"the time of {topic} went back by {-passed:.2f} s"

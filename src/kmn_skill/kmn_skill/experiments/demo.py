@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_msgs.action import OpenDoor
 from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -17,46 +16,30 @@ from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
 from kmn_skill.experiments.evaluate import NOISES, random_doors
 from kmn_skill.experiments.film_strip import save_strip
+from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
-
-
-class Narrator:
-    """Tells the phases of a goal as they come."""
-
-    def __init__(self) -> None:
-        self._told = ""
-
-    def tell(self, feedback: OpenDoor.Feedback) -> None:
-        """Print what is being done, when it changes."""
-        if feedback.phase != self._told:
-            self._told = feedback.phase
-            print(
-                f"  {feedback.phase:6s} {100 * feedback.progress:3.0f} %   "
-                f"handle {feedback.handle_angle:5.2f} rad   door {feedback.door_angle:5.2f} rad",
-                flush=True,
-            )
 
 
 def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     """Open one random door and tell how it went; return whether it is open."""
-    model = KinematicModel.load("door")
+    model = KinematicModel.load(experiment.model)
     values = random_doors(model, 1, options.seed)[0]
     goal, pace = experiment.goal(options.mode), experiment.demo
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
     options.out.mkdir(parents=True, exist_ok=True)
-    film = options.out / f"door_{options.mode}_{options.seed}.gif"
-    strip = film.with_suffix(".png")
+    recording = options.out / f"door_{options.mode}_{options.seed}.gif"
+    strip = recording.with_suffix(".png")
     print("starting sim_node, morph_node and skill_node (20 seconds)", flush=True)
     with DoorSystem(sim, "perceived", experiment.timeouts) as system:
         system.show(values, options.mode)
-        system.film(film, experiment.film.rate)
+        system.record(recording, experiment.recording.rate)
         print(f"opening a door (seed {options.seed}, {options.mode}):", flush=True)
         opened = system.open(goal, Narrator().tell)
-        system.film(None, experiment.film.rate)
-    save_strip(film, strip, experiment.film.strip)
+        system.record(None, experiment.recording.rate)
+    save_strip(recording, strip, experiment.recording.strip)
     print(comparison(model, values, opened.perceived))
     print(summary(opened))
-    print(f"film {film}, pictures {strip}")
+    print(f"recording {recording}, pictures {strip}")
     return bool(opened.result.success) and experiment.is_open(options.mode, opened.hinge)
 
 
@@ -90,7 +73,10 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--mode", choices=tuple(MODES), default="pull")
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(
-        "--out", type=Path, default=Path("outputs/door_demo"), help="folder for film and pictures"
+        "--out",
+        type=Path,
+        default=Path("outputs/door_demo"),
+        help="folder of recording and pictures",
     )
     return parser.parse_args(argv)
 

@@ -22,10 +22,11 @@ from sensor_msgs.msg import JointState
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.settings import Count, NonNegative, load_settings
 from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
-from kmn_skill.execution.opening import Goal
+from kmn_skill.execution.goal import Goal
 from kmn_skill.experiments.settings import Timeouts
+from kmn_skill.planning.layout import HINGE
 
 QUEUE_DEPTH = 10
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
@@ -41,25 +42,19 @@ class Patience(NamedTuple):
 
     Attributes
     ----------
-    frames
-        Of a new door, after which skill_node relies on no older one.
+    new_frames
+        Of another door, after which skill_node relies on no older one.
     skill_node
-        Parameters of skill_node, in seconds of the wall's clock.
+        Parameters of skill_node, in seconds of real time.
     """
 
-    frames: int
-    skill_node: dict[str, float]
+    new_frames: Count
+    skill_node: dict[str, NonNegative]
 
     @classmethod
     def load(cls) -> Patience:
         """Read ``config/skill/system.yaml``."""
-        section = Section.load(resources.find("config/skill", "system"))
-        section.allow(cls._fields)
-        parameters = section.section("skill_node")
-        return cls(
-            frames=section.whole_number("frames", 1, 1000),
-            skill_node={name: parameters.number(name, 0.0) for name in parameters.values},
-        )
+        return load_settings(cls, resources.find("config/skill", "system"))
 
 
 class Opened(NamedTuple):
@@ -139,7 +134,7 @@ class DoorSystem:
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
         self._taken.clear()
-        frames = self._patience.frames
+        frames = self._patience.new_frames
         self._client.wait(
             lambda: self._count_since(since) >= frames, scene, "what perceives the door"
         )
@@ -156,8 +151,8 @@ class DoorSystem:
         self._client.wait(answer.done, self._timeouts.goal, "skill_node")
         return Opened(answer.result().result, perceived, self._hinge)
 
-    def film(self, file: Path | None, rate: float) -> None:
-        """Let sim_node film what follows with so many pictures a second; None ends the film."""
+    def record(self, file: Path | None, rate: float) -> None:
+        """Let sim_node record what follows with so many pictures a second; None ends that."""
         self._set(record=str(file.absolute()) if file else "", record_rate=rate)
 
     def _nodes(self) -> list[tuple[str, str, dict[str, Any], list[str]]]:
@@ -219,7 +214,7 @@ class DoorSystem:
             self._taken.append(message)
 
     def _on_door(self, message: JointState) -> None:
-        self._hinge = message.position[0]
+        self._hinge = message.position[HINGE]
 
     def _publish_prototype(self) -> None:
         """Publish the prototype with the stamp of the true door."""

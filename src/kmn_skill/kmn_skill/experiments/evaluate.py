@@ -67,7 +67,7 @@ def random_doors(model: KinematicModel, count: int, seed: int) -> NDArray[np.flo
 
 def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
     """Open all doors, one after the other."""
-    model = KinematicModel.load("door")
+    model = KinematicModel.load(experiment.model)
     doors = random_doors(model, options.doors, options.seed)
     pace = experiment.evaluation
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
@@ -77,8 +77,8 @@ def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
         tqdm(doors, unit="door") as bar,
     ):
         for values in bar:
-            film = options.strip if not trials else None
-            trials.append(_open(system, values, options.mode, experiment, film))
+            strip = options.strip if not trials else None
+            trials.append(_open(system, values, options.mode, experiment, strip))
             bar.set_postfix_str(f"{sum(trial.opened for trial in trials)} open")
     return trials
 
@@ -93,13 +93,13 @@ def _open(
     """Open one door; save a strip of pictures of it if that is asked for."""
     system.show(values, mode)
     with tempfile.TemporaryDirectory() as folder:
-        film = Path(folder) / "film.gif"
+        recording = Path(folder) / "recording.gif"
         if strip:
-            system.film(film, experiment.film.rate)
+            system.record(recording, experiment.recording.rate)
         opened = system.open(experiment.goal(mode), lambda feedback: None)
         if strip:
-            system.film(None, experiment.film.rate)
-            save_strip(film, strip, experiment.film.strip)
+            system.record(None, experiment.recording.rate)
+            save_strip(recording, strip, experiment.recording.strip)
     result, is_open = opened.result, experiment.is_open(mode, opened.hinge)
     return Trial(
         values=values,

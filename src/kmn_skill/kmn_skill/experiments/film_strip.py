@@ -1,4 +1,4 @@
-"""A strip of pictures from a film, as in the paper's figure of the door motion."""
+"""A strip of pictures from a recording, as in the paper's figure of the door motion."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 from PIL import Image, ImageSequence
 
 
-def save_strip(film: Path, strip: Path, count: int) -> None:
-    """Put pictures of a film beside each other, at even distances in time from first to last.
+def save_strip(recording: Path, strip: Path, count: int) -> None:
+    """Put pictures of a recording beside each other, at even distances in time from first to last.
 
     Parameters
     ----------
-    film
+    recording
         A GIF; each of its pictures may be shown for another time.
     strip
         File to write.
     count
         Pictures in the strip.
     """
-    with Image.open(film) as pictures:
+    with Image.open(recording) as pictures:
         frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(pictures)]
         shown = [frame.info["duration"] for frame in ImageSequence.Iterator(pictures)]
     begins = np.cumsum([0, *shown[:-1]])

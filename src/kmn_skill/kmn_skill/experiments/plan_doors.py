@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +17,11 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.make_prototypes import HOME
 from kmn_skill.experiments.settings import MODES, Experiment
 from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import Prototypes
 
 
 class Planned(NamedTuple):
@@ -31,22 +32,23 @@ class Planned(NamedTuple):
     reason: str
 
 
-def opening(values: NDArray[np.float64], mode: str) -> PlanRequest:
-    """Return the request to open a closed door of parameters (n + m,) from the robot's home."""
-    theta, gamma = KinematicModel.load("door").split(values)
-    goal = Experiment.load().goal(mode)
-    return PlanRequest(
-        theta, gamma, np.array(HOME), np.zeros(2), goal.handle_angle, goal.door_angle
-    )
+def plan_doors(
+    planner: Planner,
+    doors: NDArray[np.float64],
+    request: Callable[[NDArray[np.float64]], PlanRequest],
+) -> list[Planned]:
+    """Plan for doors of parameters (N, n + m), one after the other.
 
-
-def plan_doors(planner: Planner, doors: NDArray[np.float64], mode: str) -> list[Planned]:
-    """Plan for doors (D, n + m), one after the other."""
+    Parameters
+    ----------
+    request
+        Returns what is asked for a door of parameters (n + m,).
+    """
     planned = []
     with tqdm(doors, unit="door") as bar:
         for values in bar:
             try:
-                report = planner.plan(opening(values, mode)).report
+                report = planner.plan(request(values)).report
                 planned.append(Planned(values, report, ""))
             except PlanningFailed as error:
                 planned.append(Planned(values, None, str(error)))
@@ -98,10 +100,14 @@ def main() -> int:
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of the doors")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     options = parser.parse_args()
-    generator = np.random.default_rng(options.seed)
-    doors = KinematicModel.load("door").sample(generator, options.doors)
-    with Planner() as planner:
-        result = tally(plan_doors(planner, doors, options.mode))
+    experiment = Experiment.load()
+    setup = PlanningSetup.load(KinematicModel.load(experiment.model))
+    doors = setup.model.sample(np.random.default_rng(options.seed), options.doors)
+    with Planner(setup, Prototypes.load()) as planner:
+        planned = plan_doors(
+            planner, doors, lambda values: experiment.request(setup, values, options.mode)
+        )
+    result = tally(planned)
     print(table(result))
     if options.json:
         named = {"mode": options.mode, "seed": options.seed}

@@ -2,35 +2,60 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
-from kmn_skill.execution.opening import Goal
+from kmn_perception.configuration.settings import NonNegative, Positive, load_settings
+from kmn_skill.execution.goal import Goal
+from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import PULL, PUSH
 
-MODES = {"pull": -1.0, "push": 1.0}  # and the sign of the door's angle
+MODES = {PULL: -1.0, PUSH: 1.0}  # and the sign of the door's angle
 
 
 class Pace(NamedTuple):
     """Simulated seconds in one second at most, and the camera's frames a simulated second."""
 
-    real_time_factor: float
-    camera_rate: float
+    real_time_factor: NonNegative
+    camera_rate: NonNegative
 
 
 class Timeouts(NamedTuple):
-    """Seconds for the nodes to start, a door to be seen, and a door to be opened."""
+    """Seconds to wait for something.
 
-    start: float
-    scene: float
-    goal: float
+    Attributes
+    ----------
+    start
+        For the nodes to start.
+    scene, goal
+        For a door to be seen, and to be opened.
+    server
+        For an action's server to be found.
+    """
+
+    start: NonNegative
+    scene: NonNegative
+    goal: NonNegative
+    server: NonNegative
 
 
-class Film(NamedTuple):
+class Recording(NamedTuple):
     """Pictures a simulated second, and pictures of a strip."""
 
-    rate: float
-    strip: int
+    rate: Annotated[float, Field(ge=1.0)]
+    strip: Annotated[int, Field(ge=1, le=20)]
+
+
+class PrototypeGuesses(NamedTuple):
+    """Where the base stands at the handle, metres along y, and the arm's deviation, radians."""
+
+    side: float
+    spread: NonNegative
 
 
 class Experiment(NamedTuple):
@@ -38,50 +63,44 @@ class Experiment(NamedTuple):
 
     Attributes
     ----------
+    model
+        Kinematic model of the doors.
     handle_angle, door_angle
         Of the goal, radians; the door's without sign.
     opened
         Angle from which on a door counts as open, radians.
     evaluation, demo
         How fast each of them runs.
-    timeouts, film
-        How long to wait for what, and what is filmed.
+    timeouts, recording
+        How long to wait for what, and what is recorded.
+    prototypes
+        Guesses from which the policy is solved without a prototype's solution.
     """
 
+    model: str
     handle_angle: float
-    door_angle: float
-    opened: float
+    door_angle: Positive
+    opened: Positive
     evaluation: Pace
     demo: Pace
     timeouts: Timeouts
-    film: Film
+    recording: Recording
+    prototypes: PrototypeGuesses
 
     @classmethod
     def load(cls) -> Experiment:
-        """Read ``config/skill/experiment.yaml``."""
-        section = Section.load(resources.find("config/skill", "experiment"))
-        section.allow(cls._fields)
-        film = section.section("film")
-        film.allow(Film._fields)
-        return cls(
-            handle_angle=section.number("handle_angle"),
-            door_angle=section.number("door_angle", 0.0),
-            opened=section.number("opened", 0.0),
-            evaluation=Pace(*_numbers(section.section("evaluation"), Pace._fields)),
-            demo=Pace(*_numbers(section.section("demo"), Pace._fields)),
-            timeouts=Timeouts(*_numbers(section.section("timeouts"), Timeouts._fields)),
-            film=Film(film.number("rate", 1.0), film.whole_number("strip", 1, 20)),
-        )
+        """Read the file; raise ``ConfigurationError`` if it is wrong."""
+        return load_settings(cls, resources.find("config/skill", "experiment"))
 
     def goal(self, mode: str) -> Goal:
         """Return the goal of a mode, ``pull`` or ``push``."""
         return Goal(self.handle_angle, MODES[mode] * self.door_angle)
 
+    def request(self, setup: PlanningSetup, values: NDArray[np.float64], mode: str) -> PlanRequest:
+        """Return the request to open a closed door of parameters (n + m,) from the robot's home."""
+        closed, goal = np.zeros(len(setup.model.joints)), self.goal(mode)
+        return PlanRequest(*setup.model.split(values), setup.robot.home, closed, *goal)
+
     def is_open(self, mode: str, hinge: float) -> bool:
         """Tell whether a door at this hinge angle (rad) is open to the right side."""
         return MODES[mode] * hinge >= self.opened
-
-
-def _numbers(section: Section, names: tuple[str, ...]) -> list[float]:
-    section.allow(names)
-    return [section.number(name, 0.0) for name in names]

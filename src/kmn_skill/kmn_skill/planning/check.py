@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.planning.clearance import Surface, clearance
-from kmn_skill.planning.plan import RELEASE, Phase, Plan, PlanReport, PlanRequest
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.clearance import clearance
+from kmn_skill.planning.layout import GRIPPER, HANDLE, HINGE, ROBOT
+from kmn_skill.planning.phases import PhaseName
+from kmn_skill.planning.plan import Phase, Plan, PlanReport, PlanRequest
 from kmn_skill.planning.timing import peaks
 from kmn_skill.planning.transfer import hermite
-from kmn_skill.planning.world import CONTACTS, PADS, World, boxes, surfaces
+from kmn_skill.planning.world import CONTACTS, PADS, STEM, World, boxes, surfaces
 
-HOLDING = ("left_finger", "right_finger", "left_tip", "right_tip")  # may touch the handle held
-OBSTACLES = ("base", "column", "torso", "head", "right_upper_arm", "right_forearm", "right_hand")
-MOVING = ("forearm", "wrist", "palm", *HOLDING)  # of the left arm, that may touch the robot
 SLACK = 1e-6  # of limits
 
 
@@ -27,30 +22,26 @@ class PlanRejected(Exception):  # noqa: N818
     """A plan does not fulfil what it must; the text says what."""
 
 
-def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanReport:
+def check(plan: Plan, request: PlanRequest, world: World) -> PlanReport:
     """Return what a plan is like.
 
     Parameters
     ----------
     world
-        Of the request, if it is at hand.
+        Of the request's theta and gamma.
 
     Raises
     ------
     PlanRejected
-        If it does not fulfil what ``config/skill/door.yaml`` demands.
+        If it does not fulfil what the settings of the world's setup demand.
     """
-    settings, robot = SkillSettings.load(), RobotModel.load()
-    if world is None:
-        model = KinematicModel.load("door")
-        world = World(model, request.theta, request.gamma, robot, settings.grasp)
     if not all(np.isfinite(a).all() for a in (plan.times, plan.positions, plan.velocities)):
         raise PlanRejected("it has numbers that are not finite")
-    limits = settings.check
+    limits = world.setup.settings.check
     _check_start(plan, request, limits.start)
-    _check_motion(plan, robot, world)
+    _check_motion(plan, world)
     handle, door = _check_targets(plan, request, limits.angle)
-    grasp = next(phase for phase in plan.phases if phase.name == "grasp")
+    grasp = plan.phase(PhaseName.GRASP)
     path = _sampled(plan, grasp, world, limits.samples)
     contact = _contact_error(path[grasp.last * limits.samples :], world)
     if contact > limits.contact:
@@ -58,17 +49,18 @@ def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanR
             f"gripper and handle are {1e3 * contact:.1f} mm apart, allowed are "
             f"{1e3 * limits.contact:g} mm"
         )
-    released = next((phase.last for phase in plan.phases if phase.name == RELEASE), 0)
-    least, names = _clearance(path, released * limits.samples, grasp.first * limits.samples, world)
-    if least < limits.clearance:
+    reach = plan.phase(PhaseName.REACH)
+    unheld = slice(reach.first * limits.samples, reach.last * limits.samples + 1)
+    smallest, names = _clearance(path, unheld, world)
+    if smallest < limits.clearance:
         raise PlanRejected(
-            f"{names[0]} comes within {1e3 * least:.0f} mm of {names[1]}, expected at least "
+            f"{names[0]} comes within {1e3 * smallest:.0f} mm of {names[1]}, expected at least "
             f"{1e3 * limits.clearance:g} mm"
         )
     return replace(
         plan.report,
         contact_error=contact,
-        clearance=least,
+        clearance=smallest,
         handle_angle=handle,
         door_angle=door,
         duration=float(plan.times[-1]),
@@ -77,12 +69,12 @@ def check(plan: Plan, request: PlanRequest, world: World | None = None) -> PlanR
 
 def _check_start(plan: Plan, request: PlanRequest, tolerance: float) -> None:
     start = np.concatenate([plan.positions[0], plan.door[0]])
-    error = np.abs(start - [*request.start, *request.door_start]).max()
+    error = np.abs(start - request.configuration).max()
     if error > tolerance:
         raise PlanRejected(f"it starts {error:.3g} away from the present state")
 
 
-def _check_motion(plan: Plan, robot: RobotModel, world: World) -> None:
+def _check_motion(plan: Plan, world: World) -> None:
     """Check order of times, limits of positions, velocities and accelerations, and the end."""
     steps = np.diff(plan.times)
     if plan.times[0] != 0.0 or steps.min() <= 0.0:
@@ -96,13 +88,13 @@ def _check_motion(plan: Plan, robot: RobotModel, world: World) -> None:
     if excess.max() > SLACK:
         name = world.joint_names[int(excess.argmax())]
         raise PlanRejected(f"{name} leaves its limits by {excess.max():.3g}")
-    for what, values, largest in zip(
+    for what, values, allowed in zip(
         ("velocity", "acceleration"),
         peaks(plan.positions, plan.velocities, steps),
-        np.array(list(robot.motors.values())).T,
+        world.setup.robot.limits.T,
         strict=True,
     ):
-        ratio = values / largest
+        ratio = values / allowed
         if ratio.max() > 1.0 + SLACK:
             name = plan.joint_names[int(ratio.argmax())]
             raise PlanRejected(f"{name} has {ratio.max():.2f} of the {what} allowed")
@@ -110,22 +102,22 @@ def _check_motion(plan: Plan, robot: RobotModel, world: World) -> None:
 
 def _check_targets(plan: Plan, request: PlanRequest, tolerance: float) -> tuple[float, float]:
     """Check handle and door; return their angles when pressed and at the end."""
-    press = next(phase for phase in plan.phases if phase.name == "press")
-    handle, door = float(plan.door[press.last, 1]), float(plan.door[-1, 0])
+    press = plan.phase(PhaseName.PRESS)
+    handle, door = float(plan.door[press.last, HANDLE]), float(plan.door[-1, HINGE])
     for what, angle, target in (
         ("handle is pressed", handle, request.handle_angle),
         ("door is opened", door, request.door_angle),
     ):
         if abs(angle - target) > tolerance:
             raise PlanRejected(f"the {what} to {angle:.3f} rad, wanted are {target:.3f} rad")
-    closed = np.abs(plan.door[: press.last, 0] - request.door_start[0]).max()
+    closed = np.abs(plan.door[: press.last, HINGE] - request.door_start[HINGE]).max()
     if closed > tolerance:
         raise PlanRejected(f"the door moves by {closed:.3f} rad before its handle is pressed")
     return handle, door
 
 
 def _sampled(plan: Plan, grasp: Phase, world: World, samples: int) -> NDArray[np.float64]:
-    """Return the configurations (N, 13) on the way.
+    """Return the configurations (N, D) on the way.
 
     The fingers squeeze, but stand where they touch.
     """
@@ -135,9 +127,10 @@ def _sampled(plan: Plan, grasp: Phase, world: World, samples: int) -> NDArray[np
     rates = np.gradient(plan.door, plan.times, axis=0)
     rates[~plan.velocities.any(axis=1)] = 0.0  # where the robot rests
     path = np.hstack([robot, hermite(plan.door, rates, plan.times, at)])
-    if path[grasp.last * samples :, 10].max() > world.touching:
+    gripper = path[:, ROBOT][:, GRIPPER]
+    if gripper[grasp.last * samples :].max() > world.touching:
         raise PlanRejected("the gripper does not close about the handle")
-    closing = path[grasp.first * samples :, 10]
+    closing = gripper[grasp.first * samples :]
     np.maximum(closing, world.touching, out=closing)
     return path
 
@@ -148,36 +141,30 @@ def _contact_error(path: NDArray[np.float64], world: World) -> float:
     return float(np.linalg.norm(places[:, :2] - places[:, 2:], axis=-1).max())
 
 
-@cache
-def _surfaces() -> dict[str, Surface]:
-    return surfaces(RobotModel.load(), SkillSettings.load().check.spacing)
-
-
 def _clearance(
-    path: NDArray[np.float64], released: int, closing: int, world: World
+    path: NDArray[np.float64], unheld: slice, world: World
 ) -> tuple[float, tuple[str, str]]:
-    """Return the least distance (m) between what shall not touch, and the names of the two.
+    """Return the smallest distance (m) between what must not touch, and the names of the two.
 
     Parameters
     ----------
-    released, closing
-        Configurations up to which the gripper lets go of the handle, and from which on it closes
-        about it.
+    unheld
+        Configurations from where the fingers have let go of the handle to where they close on it.
     """
-    own = boxes(RobotModel.load())
-    around = world.door_boxes(SkillSettings.load().check.stem)
-    around.update({name: own[name] for name in OBSTACLES})
-    parts = _surfaces()
+    robot, settings = world.setup.robot, world.setup.settings
+    shape, held = robot.planning, (settings.grasp.body, STEM)
+    own, parts = boxes(robot), surfaces(robot, settings.check.spacing)
+    around = world.door_boxes()
+    around.update({name: own[name] for name in shape.obstacles})
     frames = sorted({box.frame for box in around.values()} | {p.frame for p in parts.values()})
     poses = dict(zip(frames, world.poses(path, frames).transpose(1, 0, 2, 3), strict=True))
-    least, names = np.inf, ("", "")
+    smallest, names = np.inf, ("", "")
     for body, part in parts.items():
         for other, box in around.items():
-            if other in OBSTACLES and body not in MOVING:
+            if other in shape.obstacles and body not in shape.moving:
                 continue
-            held = body in HOLDING and other in ("handle", "stem")
-            free = slice(released, closing + 1) if held else slice(None)
+            free = unheld if body in shape.fingers and other in held else slice(None)
             distance = clearance(part, poses[part.frame][free], box, poses[box.frame][free])
-            if distance < least:
-                least, names = distance, (body, other)
-    return least, names
+            if distance < smallest:
+                smallest, names = distance, (body, other)
+    return smallest, names

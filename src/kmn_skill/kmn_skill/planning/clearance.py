@@ -40,7 +40,7 @@ def clearance(
     box: Box,
     box_poses: NDArray[np.float64],
 ) -> float:
-    """Return the least distance between a surface and a box; negative where they overlap.
+    """Return the smallest distance between a surface and a box; negative where they overlap.
 
     Parameters
     ----------

@@ -8,9 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-PHASE_NAMES = ("reach", "grasp", "press", "open")
-RELEASE = "release"  # comes before them if the hand is at the handle
-
 
 class PlanningFailed(Exception):  # noqa: N818
     """No plan was found that passes the check; the text says why."""
@@ -29,7 +26,7 @@ class PlanRequest:
     theta, gamma
         (n,) transformation and (m,) configuration parameters of the kinematic model.
     start
-        (11,) present positions of the robot's joints, m and rad.
+        (J,) present positions of the robot's joints, m and rad.
     door_start
         (2,) present angles of hinge and handle, radians.
     handle_angle
@@ -45,6 +42,11 @@ class PlanRequest:
     door_start: NDArray[np.float64]
     handle_angle: float
     door_angle: float
+
+    @property
+    def configuration(self) -> NDArray[np.float64]:
+        """(D,) where robot and door are, m and rad."""
+        return np.concatenate([self.start, self.door_start])
 
     def is_finite(self) -> bool:
         """Tell whether all numbers are finite."""
@@ -68,9 +70,9 @@ class PlanReport:
     Attributes
     ----------
     contact_error
-        Largest distance between points of gripper and handle that shall coincide.
+        Largest distance between points of gripper and handle that should coincide.
     clearance
-        Least distance between what shall not touch.
+        Smallest distance between what must not touch.
     handle_angle, door_angle
         To which the handle is pressed, and the door is opened at the end.
     duration
@@ -97,11 +99,11 @@ class Plan:
     Attributes
     ----------
     joint_names
-        Of the robot: base x, y, yaw, seven of the left arm, and the gripper's.
+        Of the robot: base x, y, yaw, those of the arm, and the gripper's.
     times
         (T,) seconds from the start.
     positions, velocities
-        (T, 11) of the robot's joints, m and rad, and per second.
+        (T, J) of the robot's joints, m and rad, and per second.
     door
         (T, 2) angles of hinge and handle, radians.
     phases
@@ -117,3 +119,7 @@ class Plan:
     door: NDArray[np.float64]
     phases: tuple[Phase, ...]
     report: PlanReport
+
+    def phase(self, name: str) -> Phase:
+        """Return the phase of a name."""
+        return next(phase for phase in self.phases if phase.name == name)

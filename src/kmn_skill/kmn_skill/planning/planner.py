@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import time
 from collections.abc import Callable
@@ -9,10 +10,10 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
-from kmn_skill.planning import prototypes
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
 from kmn_skill.planning.planning_process import READY, serve
-from kmn_skill.planning.settings import SkillSettings
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import Guess, Prototypes
 
 POLL_PERIOD = 0.02  # seconds
 STOP_TIMEOUT = 2.0  # seconds for the process to end
@@ -21,14 +22,32 @@ STOP_TIMEOUT = 2.0  # seconds for the process to end
 class Planner:
     """Plans one request at a time; to be used as a context, which owns the process.
 
+    Parameters
+    ----------
+    setup
+        Object, robot and policy.
+    prototypes
+        Solutions to start from.
+    time_limit
+        Seconds for a plan.
+
     Attributes
     ----------
     restarts
         How often the process had to be started anew.
+
+    Raises
+    ------
+    ConfigurationError
+        If the solutions are for other joints than those of robot and object.
     """
 
-    def __init__(self, settings: SkillSettings | None = None) -> None:
-        self._settings = (settings or SkillSettings.load()).planner
+    def __init__(
+        self, setup: PlanningSetup, prototypes: Prototypes, time_limit: float = math.inf
+    ) -> None:
+        prototypes.check(setup.joint_names)
+        self._setup, self._prototypes, self._time_limit = setup, prototypes, time_limit
+        self._settings = setup.settings.planner
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._loaded = False
@@ -63,13 +82,13 @@ class Planner:
         """
         if not request.is_finite():
             raise PlanningFailed("the request has numbers that are not finite")
-        begin, left = time.monotonic(), self._settings.time_limit
+        begin, left = time.monotonic(), self._time_limit
         reasons = []
-        for guess in prototypes.guesses(
+        for guess in self._prototypes.guesses(
             request.door_angle, self._settings.attempts, self._settings.spread
         ):
             if left <= 0.0:
-                reasons.append(f"the {self._settings.time_limit:g} s are over")
+                reasons.append(f"the {self._time_limit:g} s are over")
                 break
             connection = self._ready(cancelled)
             attempted = time.monotonic()
@@ -114,7 +133,7 @@ class Planner:
         self,
         connection: Connection,
         request: PlanRequest,
-        guess: prototypes.Prototype,
+        guess: Guess,
         limit: float,
         cancelled: Callable[[], bool],
     ) -> Plan | str:
@@ -138,7 +157,9 @@ class Planner:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._connection, other = context.Pipe()
-        self._process = context.Process(target=serve, args=(other,), name="planner", daemon=True)
+        self._process = context.Process(
+            target=serve, args=(other, self._setup), name="planner", daemon=True
+        )
         self._process.start()
         self._loaded = False
         other.close()

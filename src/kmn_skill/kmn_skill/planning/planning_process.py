@@ -7,23 +7,25 @@ import signal
 import tempfile
 from multiprocessing.connection import Connection
 
+from kmn_skill.planning.planning_setup import PlanningSetup
+
 READY = "ready"  # is sent when all is loaded
 
 
-def serve(connection: Connection) -> None:
+def serve(connection: Connection, setup: PlanningSetup) -> None:
     """Say when ready, then answer each (request, guess) with a plan, or why there is none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # the package robotic writes a log where it is
         _silence()
-        _answer(connection)
+        _answer(connection, setup)
 
 
-def _answer(connection: Connection) -> None:
+def _answer(connection: Connection, setup: PlanningSetup) -> None:
     from kmn_skill.planning.check import PlanRejected
     from kmn_skill.planning.solver import Solver
 
-    solver = Solver()
+    solver = Solver(setup)
     connection.send(READY)
     while True:
         try:

@@ -1,29 +1,27 @@
 """The policy: a constrained trajectory optimisation problem on the kinematic model (Sec. III-D).
 
-Time runs from 0 to 4: at 1 the gripper is before the handle, at 2 about it, at 3 the handle is
-pressed, at 4 the door is open. One step after 2 the gripper closes.
+Time runs from 0 to the last `PhaseEnd`. One step after `PhaseEnd.GRASP` the gripper has closed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import robotic as ry
 from numpy.typing import ArrayLike, NDArray
 
+from kmn_skill.planning.layout import BASE_AND_ARM, DOOR, HANDLE, HINGE
+from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import PolicySettings
 from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, door_body
 
-PHASE_COUNT = 4
 COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
 
 
 class Pair(NamedTuple):
-    """Two bodies that shall not touch between two times."""
+    """Two bodies that must not touch between two times."""
 
     first: str
     second: str
@@ -39,9 +37,9 @@ class Policy:
     world
         The kinematic model with the robot.
     slices
-        Configurations a phase; T is four times this.
+        Configurations a phase; T is `PHASE_COUNT` times this.
     pairs
-        What shall not touch.
+        What must not touch.
 
     Attributes
     ----------
@@ -52,14 +50,13 @@ class Policy:
     def __init__(
         self,
         world: World,
-        robot: RobotModel,
         request: PlanRequest,
-        settings: PolicySettings,
         slices: int,
         pairs: Iterable[Pair],
     ) -> None:
-        self._world, self._robot, self._settings = world, robot, settings
-        world.configuration.setJointState([*request.start, *request.door_start])
+        self._world, self._robot = world, world.setup.robot
+        self._settings = world.setup.settings.policy
+        world.configuration.setJointState(request.configuration)
         self.problem: Any = ry.KOMO(world.configuration, PHASE_COUNT, slices, 2, False)
         self._step = 1.0 / slices
         self._add_costs(request)
@@ -69,45 +66,48 @@ class Policy:
     def _add_costs(self, request: PlanRequest) -> None:
         """Smooth motion, base pose before the door, pre-grasp pose of the gripper."""
         robot, settings, step = self._robot, self._settings, self._step
-        arm = [*robot.model_joints[:-1], *self._world.model_joints[-2:]]
+        # All but the gripper.
+        smooth = [*robot.model_joints[BASE_AND_ARM], *self._world.model_joints[DOOR]]
         rate = np.sqrt(step)  # the sum over the steps is an integral over time
-        self._add("acceleration", [], ry.FS.qItself, arm, COST, scale=rate, order=2)
-        gripper = [robot.gripper]
-        self._add("acceleration", [step, 1.0], ry.FS.qItself, gripper, COST, scale=rate, order=2)
+        self._add("acceleration", [], ry.FS.qItself, smooth, COST, scale=rate, order=2)
+        gripper, opening = [robot.gripper.joint], [step, PhaseEnd.PRE_GRASP]
+        self._add("acceleration", opening, ry.FS.qItself, gripper, COST, scale=rate, order=2)
 
-        base = [robot.base, GRASP]
-        along = np.eye(3)[:2]
-        self._add("base", [2.0], ry.FS.positionRel, base, COST, [*settings.base, 0.0], along)
-        self._add("base", [2.0], ry.FS.scalarProductXY, [robot.base, OBJECT], COST)
+        base, place, along = [robot.base, GRASP], [*settings.base, 0.0], np.eye(3)[:2]
+        self._add("base", [PhaseEnd.GRASP], ry.FS.positionRel, base, COST, place, along)
+        self._add("base", [PhaseEnd.GRASP], ry.FS.scalarProductXY, [robot.base, OBJECT], COST)
 
         tool, before = [TOOL, GRASP], [settings.pre_grasp, 0.0, 0.0]
-        self._add("pre_grasp", [1.0], ry.FS.positionRel, tool, COST, before)
-        self._add("end", [4.0], ry.FS.qItself, arm, COST, order=1)
-        self._add("heading", [1.0, 2.0], ry.FS.scalarProductXX, tool, COST, [1.0])
+        self._add("pre_grasp", [PhaseEnd.PRE_GRASP], ry.FS.positionRel, tool, COST, before)
+        self._add("end", [PhaseEnd.OPEN], ry.FS.qItself, smooth, COST, order=1)
+        approach = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP]
+        self._add("heading", approach, ry.FS.scalarProductXX, tool, COST, [1.0])
 
     def _add_equalities(self, request: PlanRequest) -> None:
         """Targets of handle and door, contact, and what is fixed when."""
         robot, step = self._robot, self._step
-        hinge, handle = ([name] for name in self._world.model_joints[-2:])
-        gripper, others = [robot.gripper], list(robot.model_joints[:-1])
-        hinge_start, handle_start = request.door_start
+        hinge, handle = ([name] for name in self._world.model_joints[DOOR])
+        gripper, others = [robot.gripper.joint], list(robot.model_joints[BASE_AND_ARM])
+        hinge_start, handle_start = request.door_start[[HINGE, HANDLE]]
+        grasped, pulling = PhaseEnd.GRASP + step, PhaseEnd.PRESSED + step
 
-        self._add("target", [3.0], ry.FS.qItself, handle, EQUAL, [request.handle_angle])
-        self._add("target", [4.0], ry.FS.qItself, hinge, EQUAL, [request.door_angle])
+        pressed = [request.handle_angle]
+        self._add("target", [PhaseEnd.PRESSED], ry.FS.qItself, handle, EQUAL, pressed)
+        self._add("target", [PhaseEnd.OPEN], ry.FS.qItself, hinge, EQUAL, [request.door_angle])
 
         for pad, contact in zip(PADS, CONTACTS, strict=True):
-            times = [2.0 + step, 4.0]
+            times = [grasped, PhaseEnd.OPEN]
             self._add("contact", times, ry.FS.positionDiff, [pad, contact], EQUAL)
 
-        self._add("fixed", [step, 3.0], ry.FS.qItself, hinge, EQUAL, [hinge_start])
-        self._add("fixed", [step, 2.0 + step], ry.FS.qItself, handle, EQUAL, [handle_start])
-        self._add("fixed", [3.0 + step, 4.0], ry.FS.qItself, handle, EQUAL, [request.handle_angle])
-        opened = [self._settings.open_gripper]
-        self._add("fixed", [1.0, 2.0], ry.FS.qItself, gripper, EQUAL, opened)
-        self._add("rest", [2.0 + step], ry.FS.qItself, others, EQUAL, order=1)
+        self._add("fixed", [step, PhaseEnd.PRESSED], ry.FS.qItself, hinge, EQUAL, [hinge_start])
+        self._add("fixed", [step, grasped], ry.FS.qItself, handle, EQUAL, [handle_start])
+        self._add("fixed", [pulling, PhaseEnd.OPEN], ry.FS.qItself, handle, EQUAL, pressed)
+        times, opened = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP], [self._settings.open_gripper]
+        self._add("fixed", times, ry.FS.qItself, gripper, EQUAL, opened)
+        self._add("rest", [grasped], ry.FS.qItself, others, EQUAL, order=1)
 
         # Straight towards the handle, with one finger above and one below it.
-        times, tool = [1.0, 2.0 - step], [TOOL, GRASP]
+        times, tool = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP - step], [TOOL, GRASP]
         self._add("approach", times, ry.FS.positionRel, tool, EQUAL, [0.0] * 3, np.eye(3)[1:])
         self._add("approach", times, ry.FS.scalarProductYX, tool, EQUAL)
         self._add("approach", times, ry.FS.scalarProductYY, tool, EQUAL)
@@ -123,7 +123,7 @@ class Policy:
     def _add(
         self,
         weight: str,
-        times: list[float],
+        times: Sequence[float],
         feature: Any,
         frames: list[str],
         kind: Any,
@@ -133,17 +133,20 @@ class Policy:
     ) -> None:
         """Add a feature over times; `kind` is a cost, an equality or an inequality."""
         scale = self._settings.weights[weight] * np.atleast_1d(np.asarray(scale))
-        self.problem.addObjective(times, feature, frames, kind, scale, target or [], order)
+        interval = [float(time) for time in times]
+        self.problem.addObjective(interval, feature, frames, kind, scale, target or [], order)
 
 
-def pairs(settings: PolicySettings, world: World) -> list[Pair]:
-    """Return all pairs of bodies that shall not touch."""
+def pairs(world: World) -> list[Pair]:
+    """Return all pairs of bodies that must not touch."""
+    settings = world.setup.settings.policy
     panel, handle = (door_body(name) for name in world.door_bodies)
     door = [(body, panel) for body in settings.door_collisions]
     door += [(body, handle) for body in settings.handle_collisions]
     own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
     always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*door, *own)]
-    return always + [Pair(body, handle, 0.0, 1.0) for body in settings.approach_collisions]
+    before = float(PhaseEnd.PRE_GRASP)
+    return always + [Pair(body, handle, 0.0, before) for body in settings.approach_collisions]
 
 
 def near_pairs(
@@ -154,7 +157,7 @@ def near_pairs(
     Parameters
     ----------
     path
-        (T, 13) positions of the dofs, equally spaced over the time.
+        (T, D) positions of the dofs, equally spaced over the time.
     near
         Metres.
     """

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_skill.planning.layout import BASE_POSITION, DOOR, GRIPPER, HANDLE, ROBOT
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.world import GRASP, TOOL, World
 
 
 def release(world: World, request: PlanRequest, settings: SkillSettings) -> NDArray[np.float64]:
-    """Return how the hand lets go (R, 13) after the start; R = 0 if it is not at the handle.
+    """Return how the hand lets go (R, D) after the start; R = 0 if it is not at the handle.
 
     It is there when it is nearer than the pre-grasp pose. The gripper opens where it is, and the
-    handle springs back; then the base drives so far that the hand draws straight back.
+    handle springs back; then the base drives the hand straight back to the pre-grasp distance.
     """
-    start = np.concatenate([request.start, request.door_start])
+    start = request.configuration
     tool, grasp = world.poses(start[None], [TOOL, GRASP])[0]
     distance = -settings.policy.pre_grasp
     if np.linalg.norm(tool[:3, 3] - grasp[:3, 3]) >= distance:
@@ -25,9 +26,10 @@ def release(world: World, request: PlanRequest, settings: SkillSettings) -> NDAr
     steps = np.arange(1, slices + 1)[:, None] / slices
     smooth = steps**2 * (3.0 - 2.0 * steps)  # from rest to rest
     opened = start.copy()
-    opened[10], opened[12] = max(start[10], settings.policy.open_gripper), 0.0
+    gripper = max(request.start[GRIPPER], settings.policy.open_gripper)
+    opened[ROBOT][GRIPPER], opened[DOOR][HANDLE] = gripper, 0.0
     drawn_back = opened.copy()
-    drawn_back[:2] -= distance * tool[:2, 0] / np.linalg.norm(tool[:2, 0])
+    drawn_back[BASE_POSITION] -= distance * tool[:2, 0] / np.linalg.norm(tool[:2, 0])
     path = [start + smooth * (opened - start), opened + smooth * (drawn_back - opened)]
     # The start is as measured: a joint may stand a little beyond its limit.
     return np.clip(np.concatenate(path), *world.limits())

@@ -1,10 +1,10 @@
-"""The planner's PR2: which joints and bodies it has, from ``config/skill/pr2.yaml``."""
+"""The planner's robot: its joints and bodies, from ``config/robots/NAME.yaml``."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +12,34 @@ from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.settings import NonNegative, Positive, read_settings
+from kmn_skill.planning.layout import BASE
 
 
-class Motor(NamedTuple):
-    """Largest velocity (m/s or rad/s) and acceleration (m/s^2 or rad/s^2) of a joint."""
+class RobotJoint(NamedTuple):
+    """A movable joint, in m or rad and seconds.
 
-    velocity: float
-    acceleration: float
+    Attributes
+    ----------
+    home
+        Where it starts.
+    effort, velocity
+        The largest ones of its motor, which the simulator needs.
+    planned
+        Largest velocity and acceleration of a plan.
+    """
+
+    home: float
+    effort: Positive
+    velocity: Positive
+    planned: tuple[Positive, Positive]
+
+
+class Gripper(NamedTuple):
+    """The gripper's joint, and the joints that turn with it."""
+
+    joint: str
+    followers: tuple[str, ...]
 
 
 class RobotBody(NamedTuple):
@@ -36,20 +57,49 @@ class RobotBody(NamedTuple):
 
     joint: str
     meshes: tuple[str, ...]
-    below: float
-    above: float
+    below: float = math.inf
+    above: float = -math.inf
 
 
 class Pad(NamedTuple):
-    """The point (3,) in the frame of a joint with which a finger touches, metres."""
+    """The point in the frame of a joint with which a finger touches, metres."""
 
     joint: str
-    point: NDArray[np.float64]
+    point: tuple[float, float, float]
+
+
+class Pads(NamedTuple):
+    """Those of the two fingers."""
+
+    left: Pad
+    right: Pad
+
+
+class RobotShape(NamedTuple):
+    """What the planner knows of the robot's shape beside its model.
+
+    Attributes
+    ----------
+    rounding
+        Radius of the corners of the boxes about the bodies, metres.
+    bodies
+        By name.
+    fingers, moving, obstacles
+        Names of bodies: fingers may touch what they hold; moving ones, of the arm, must keep
+        clear of the robot's own obstacles.
+    """
+
+    rounding: NonNegative
+    bodies: dict[str, RobotBody]
+    pads: Pads
+    fingers: tuple[str, ...]
+    moving: tuple[str, ...]
+    obstacles: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """What the planner knows of the PR2 beside its model.
+    """What the planner knows of a robot.
 
     Attributes
     ----------
@@ -57,73 +107,59 @@ class RobotModel:
         The model's file in the folder of robotic's models.
     base
         The model's joint of x, y and yaw.
-    motors
-        Joints by name, in the order of ``joint_states``: base x, y, yaw, arm, gripper.
-    followers
-        Joints that turn with the gripper's.
-    rounding
-        Radius of the corners of the boxes about the bodies, metres.
+    joints
+        By name, in the order of ``joint_states``: base x, y, yaw, arm, gripper.
     """
 
+    name: str
     source: str
     base: str
-    motors: dict[str, Motor]
-    followers: tuple[str, ...]
-    rounding: float
-    bodies: dict[str, RobotBody]
-    pads: tuple[Pad, Pad]
+    joints: dict[str, RobotJoint]
+    gripper: Gripper
+    planning: RobotShape
+
+    @classmethod
+    def load(cls, name_or_path: str | Path) -> RobotModel:
+        """Read ``config/robots/NAME.yaml`` or the user's own file.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        ConfigurationError
+            If a key is missing, unknown or wrong, or the joints do not end with the gripper's.
+        """
+        section = Section.load(resources.find("config/robots", name_or_path))
+        # What only the simulator reads.
+        own = {key: value for key, value in section.values.items() if key != "simulation"}
+        robot = read_settings(cls, Section(own, section.place))
+        if robot.joint_names[-1] != robot.gripper.joint:
+            raise section.error(
+                f"the last joint must be the gripper's, '{robot.gripper.joint}', "
+                f"found '{robot.joint_names[-1]}'"
+            )
+        shape = robot.planning
+        for name in (*shape.fingers, *shape.moving, *shape.obstacles):
+            if name not in shape.bodies:
+                raise section.error(f"planning: there is no body '{name}'")
+        return robot
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints in the order of ``joint_states``."""
-        return tuple(self.motors)
+        return tuple(self.joints)
 
     @property
     def model_joints(self) -> tuple[str, ...]:
         """Names of the joints in the model, which has one for the base."""
-        return (self.base, *self.joint_names[3:])
+        return (self.base, *self.joint_names[BASE.stop :])
 
     @property
-    def gripper(self) -> str:
-        """Name of the gripper's joint."""
-        return self.joint_names[-1]
+    def home(self) -> NDArray[np.float64]:
+        """(J,) positions at which the robot starts, m and rad."""
+        return np.array([joint.home for joint in self.joints.values()])
 
-    @classmethod
-    @cache
-    def load(cls) -> RobotModel:
-        """Read the configuration file."""
-        section = Section.load(resources.find("config/skill", "pr2"))
-        section.allow(
-            ("name", "source", "base", "joints", "followers", "rounding", "bodies", "pads")
-        )
-        joints, bodies, pads = (section.section(key) for key in ("joints", "bodies", "pads"))
-        pads.allow(("left", "right"))
-        return cls(
-            source=section.text("source"),
-            base=section.text("base"),
-            motors={name: _motor(joints.section(name)) for name in joints.values},
-            followers=tuple(section.values["followers"]),
-            rounding=section.number("rounding", 0.0),
-            bodies={name: _body(bodies.section(name)) for name in bodies.values},
-            pads=(_pad(pads.section("left")), _pad(pads.section("right"))),
-        )
-
-
-def _motor(section: Section) -> Motor:
-    section.allow(("velocity", "acceleration"))
-    return Motor(section.number("velocity", 0.0), section.number("acceleration", 0.0))
-
-
-def _body(section: Section) -> RobotBody:
-    section.allow(("joint", "meshes"), ("below", "above"))
-    return RobotBody(
-        section.text("joint"),
-        tuple(section.values["meshes"]),
-        section.number("below") if "below" in section else math.inf,
-        section.number("above") if "above" in section else -math.inf,
-    )
-
-
-def _pad(section: Section) -> Pad:
-    section.allow(("joint", "point"))
-    return Pad(section.text("joint"), np.array(section.numbers("point", 3)))
+    @property
+    def limits(self) -> NDArray[np.float64]:
+        """(J, 2) largest velocities and accelerations of a plan, m or rad and seconds."""
+        return np.array([joint.planned for joint in self.joints.values()])

@@ -10,29 +10,27 @@ import numpy as np
 import robotic as ry
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.check import PlanRejected, check
+from kmn_skill.planning.layout import DOOR, ROBOT
 from kmn_skill.planning.plan import Plan, PlanRequest
+from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
 from kmn_skill.planning.release import release
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.timing import preceded, timed_plan
 from kmn_skill.planning.transfer import refine, transfer
 from kmn_skill.planning.world import World
 
 
 class Solver:
-    """Solves the policy; what does not depend on the request is loaded once."""
+    """Solves the policy; what does not depend on the request is prepared once."""
 
-    def __init__(self) -> None:
-        self._settings, self._robot = SkillSettings.load(), RobotModel.load()
-        self.model = KinematicModel.load("door")
-        self.world(np.zeros(len(self.model.theta)), np.zeros(len(self.model.gamma)))
+    def __init__(self, setup: PlanningSetup) -> None:
+        self._setup = setup
+        self.world(*setup.model.split(setup.model.prototype))
 
     def world(self, theta: NDArray[np.float64], gamma: NDArray[np.float64]) -> World:
         """Return the world of the door m(theta, gamma)."""
-        return World(self.model, theta, gamma, self._robot, self._settings.grasp)
+        return World(self._setup, theta, gamma)
 
     def plan(self, request: PlanRequest, guess: NDArray[np.float64], name: str) -> Plan:
         """Return a plan that passes the check.
@@ -40,7 +38,7 @@ class Solver:
         Parameters
         ----------
         guess
-            (T + 1, 13) solution for a prototype, to be transferred.
+            (T + 1, D) solution for a prototype, to be transferred.
         name
             Of the guess.
 
@@ -49,29 +47,29 @@ class Solver:
         PlanRejected
             If the solution does not pass.
         """
-        world, timing = self.world(request.theta, request.gamma), self._settings.timing
-        first = np.vstack([_start(request), release(world, request, self._settings)])
-        begin = replace(request, start=first[-1, :11], door_start=first[-1, 11:])
-        path = self._solve(world, begin, transfer(guess, self.model, begin))
-        plan = timed_plan(path, begin, self._robot, timing)
+        model, robot, settings = self._setup.model, self._setup.robot, self._setup.settings
+        world = self.world(request.theta, request.gamma)
+        first = np.vstack([request.configuration, release(world, request, settings)])
+        begin = replace(request, start=first[-1, ROBOT], door_start=first[-1, DOOR])
+        path = self._solve(world, begin, transfer(guess, model, begin))
+        plan = timed_plan(path, begin, robot, settings.timing)
         if len(first) > 1:
-            plan = preceded(plan, first, self._robot, timing)
+            plan = preceded(plan, first, robot, settings.timing)
         plan = replace(plan, report=replace(plan.report, seed_used=name))
         return replace(plan, report=check(plan, request, world))
 
     def coarse(
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the solution (T, 13) with few configurations, from a guess of as many.
+        """Return the solution (T, D) with few configurations, from a guess of as many.
 
         Raises
         ------
         PlanRejected
             If it is none.
         """
-        settings = self._settings
-        slices, around = settings.planner.coarse, pairs(settings.policy, world)
-        policy = Policy(world, self._robot, request, settings.policy, slices, around)
+        settings = self._setup.settings
+        policy = Policy(world, request, settings.planner.coarse, pairs(world))
         path, violation = optimise(policy.problem, self._disturbed(guess), settings.solver)
         if violation > settings.planner.violation:
             raise PlanRejected("no motion was found that fulfils all constraints")
@@ -80,35 +78,29 @@ class Solver:
     def _solve(
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        settings = self._settings
+        settings = self._setup.settings
         path = self.coarse(world, request, guess)
-        around = pairs(settings.policy, world)
-        around = near_pairs(world, around, path, settings.planner.near)
+        around = near_pairs(world, pairs(world), path, settings.planner.near)
         slices = settings.planner.fine
-        policy = Policy(world, self._robot, request, settings.policy, slices, around)
-        finer = refine(self._disturbed(path), _start(request), slices)
+        policy = Policy(world, request, slices, around)
+        finer = refine(self._disturbed(path), request.configuration, slices)
         return optimise(policy.problem, finer, settings.solver)[0]
 
     def _disturbed(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add some noise (m and rad) to a coarse path (T, 13), the same each time.
+        """Add some noise (m and rad) to a coarse path (T, D), the same each time.
 
         On a guess that almost fulfils the constraints the solver ends at once, before it fulfils
-        them. Between the configurations of the coarse path the noise is smooth: from a fine path
-        that trembles the first steps are wild and lead into obstacles.
+        them. The noise is interpolated with the coarse path, hence smooth: from a jagged fine path
+        the first steps are so large that they lead into obstacles.
         """
         generator = np.random.default_rng(0)
-        return path + generator.normal(0.0, self._settings.planner.noise, path.shape)
-
-
-def _start(request: PlanRequest) -> NDArray[np.float64]:
-    """Return where robot and door are (13,)."""
-    return np.concatenate([request.start, request.door_start])
+        return path + generator.normal(0.0, self._setup.settings.planner.noise, path.shape)
 
 
 def optimise(
     problem: Any, guess: NDArray[np.float64], options: Mapping[str, float]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return where the solver ends (T, 13), and how much it violates the constraints."""
+    """Return where the solver ends (T, D), and how much it violates the constraints."""
     program = problem.nlp()
     low, high = program.getBounds()
     first = guess.reshape(-1)

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.planning.plan import PHASE_NAMES, RELEASE, Phase, Plan, PlanReport, PlanRequest
+from kmn_skill.planning.layout import DOOR, GRIPPER, ROBOT
+from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd, PhaseName
+from kmn_skill.planning.plan import Phase, Plan, PlanReport, PlanRequest
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import TimingSettings
 
@@ -25,13 +27,12 @@ def timed_plan(
     Parameters
     ----------
     path
-        (T, 13) positions after the start.
+        (T, D) positions after the start.
     """
-    nodes = np.vstack([[*request.start, *request.door_start], path])
-    quarter = len(path) // 4
-    grasp, pressed, end = 2 * quarter, 3 * quarter, 4 * quarter
-    positions = nodes[:, :11].copy()
-    limits = np.array(list(robot.motors.values()))
+    nodes = np.vstack([request.configuration, path])
+    slices = len(path) // PHASE_COUNT
+    grasp, pressed, end = PhaseEnd.GRASP * slices, PhaseEnd.PRESSED * slices, len(path)
+    positions, limits = nodes[:, ROBOT].copy(), robot.limits
     times, velocities = np.zeros(len(nodes)), np.zeros_like(positions)
     times[: grasp + 1], velocities[: grasp + 1] = _paced(
         positions[: grasp + 1], limits, settings.min_step
@@ -39,13 +40,17 @@ def timed_plan(
     after, rates = _paced(positions[grasp + 1 :], limits, settings.min_step)
     times[grasp + 1 :] = times[grasp] + settings.dwell + after
     velocities[grasp + 1 :] = rates
-    positions[grasp + 1 :, -1] = np.maximum(nodes[grasp + 1 :, 10] - settings.squeeze, 0.0)
-    velocities[grasp + 1 :, -1] = 0.0
-    borders = ((0, grasp), (grasp, grasp + 1), (grasp + 1, pressed), (pressed, end))
-    phases = tuple(Phase(name, *border) for name, border in zip(PHASE_NAMES, borders, strict=True))
-    return Plan(
-        robot.joint_names, times, positions, velocities, nodes[:, 11:].copy(), phases, UNCHECKED
+    held = positions[grasp + 1 :, GRIPPER]
+    held[:] = np.maximum(held - settings.squeeze, 0.0)
+    velocities[grasp + 1 :, GRIPPER] = 0.0
+    phases = (
+        Phase(PhaseName.REACH, 0, grasp),
+        Phase(PhaseName.GRASP, grasp, grasp + 1),
+        Phase(PhaseName.PRESS, grasp + 1, pressed),
+        Phase(PhaseName.OPEN, pressed, end),
     )
+    door = nodes[:, DOOR].copy()
+    return Plan(robot.joint_names, times, positions, velocities, door, phases, UNCHECKED)
 
 
 def preceded(
@@ -56,19 +61,18 @@ def preceded(
     Parameters
     ----------
     path
-        (R + 1, 13) positions, with the start, up to where the plan begins.
+        (R + 1, D) positions, with the start, up to where the plan begins.
     """
-    limits = np.array(list(robot.motors.values()))
-    times, velocities = _paced(path[:, :11], limits, settings.min_step)
+    times, velocities = _paced(path[:, ROBOT], robot.limits, settings.min_step)
     count = len(path) - 1
     phases = [Phase(name, first + count, last + count) for name, first, last in plan.phases]
     return replace(
         plan,
         times=np.concatenate([times, times[-1] + plan.times[1:]]),
-        positions=np.vstack([path[:, :11], plan.positions[1:]]),
+        positions=np.vstack([path[:, ROBOT], plan.positions[1:]]),
         velocities=np.vstack([velocities, plan.velocities[1:]]),
-        door=np.vstack([path[:, 11:], plan.door[1:]]),
-        phases=(Phase(RELEASE, 0, count), *phases),
+        door=np.vstack([path[:, DOOR], plan.door[1:]]),
+        phases=(Phase(PhaseName.RELEASE, 0, count), *phases),
     )
 
 

@@ -8,39 +8,42 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.transformation import rotation_z
 from kmn_skill.planning.kinematics import turn
+from kmn_skill.planning.layout import BASE, DOOR, HANDLE, HINGE, ROBOT
+from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.policy import PHASE_COUNT
 
 
 def transfer(
     path: NDArray[np.float64], model: KinematicModel, request: PlanRequest
 ) -> NDArray[np.float64]:
-    """Return a path (T, 13) for a door, made from the prototype's.
+    """Return a path (T, D) for a door, made from the prototype's.
 
     The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
-    shall turn by other angles than the prototype, or is ajar, the base also turns with it about
-    its hinge. What then parts the path from the present state fades out up to the pre-grasp pose.
+    is to turn by other angles than the prototype, or is ajar, the base also turns with it about
+    its hinge. The remaining difference to the present state fades out up to the pre-grasp pose.
 
     Parameters
     ----------
     path
-        (T + 1, 13) of the prototype, with the start.
+        (T + 1, D) of the prototype, with the start.
     """
     guess = path.copy()
-    guess[:, 11] = _stretched(path[:, 11], request.door_start[0], request.door_angle)
-    guess[:, 12] = _stretched(path[:, 12], request.door_start[1], request.handle_angle)
-    prototype = np.zeros_like(request.gamma)
+    for column, goal in ((HINGE, request.door_angle), (HANDLE, request.handle_angle)):
+        angles = guess[:, DOOR][:, column]
+        angles[:] = _stretched(angles, request.door_start[column], goal)
+    _, prototype = model.split(model.prototype)
     pose = model.transformation.matrix(request.theta)
     hinge, handle = model.joints
     shift = np.eye(4)
     shift[:3, 3] = handle.origin(request.gamma) - handle.origin(prototype)
     for before, after in zip(path, guess, strict=True):
-        closing = np.linalg.inv(turn(hinge, prototype, before[11]))
-        opening = turn(hinge, request.gamma, after[11])
-        after[:3] = move_base(before[:3], pose @ opening @ shift @ closing)
-    phase = (len(path) - 1) // PHASE_COUNT
-    fading = np.clip(1.0 - np.arange(len(path)) / phase, 0.0, 1.0)[:, None]
-    guess[:, :11] += fading**2 * (3.0 - 2.0 * fading) * (request.start - guess[0, :11])
+        closing = np.linalg.inv(turn(hinge, prototype, before[DOOR][HINGE]))
+        opening = turn(hinge, request.gamma, after[DOOR][HINGE])
+        after[BASE] = move_base(before[BASE], pose @ opening @ shift @ closing)
+    before_handle = PhaseEnd.PRE_GRASP * ((len(path) - 1) // PHASE_COUNT)
+    fading = np.clip(1.0 - np.arange(len(path)) / before_handle, 0.0, 1.0)[:, None]
+    robot = guess[:, ROBOT]
+    robot += fading**2 * (3.0 - 2.0 * fading) * (request.start - robot[0])
     return guess[1:]
 
 
@@ -56,22 +59,23 @@ def refine(
 ) -> NDArray[np.float64]:
     """Interpolate a coarse path to more configurations a phase.
 
-    At the time 2 only the gripper moves, in one step, on either path.
+    After `PhaseEnd.GRASP` only the gripper moves for one step, on either path.
 
     Parameters
     ----------
     path
-        (T, 13) with ``T / 4`` configurations a phase.
+        (T, D) with ``T / PHASE_COUNT`` configurations a phase.
     start
-        (13,) configuration before the first one.
+        (D,) configuration before the first one.
     slices
         Configurations a phase of the result.
     """
     coarse = len(path) // PHASE_COUNT
     nodes = np.vstack([start, path])
-    reach = _resampled(nodes[: 2 * coarse + 1], 2 * slices + 1)[1:]
-    press = _resampled(nodes[2 * coarse + 1 : 3 * coarse + 1], slices)
-    opening = _resampled(nodes[3 * coarse :], slices + 1)[1:]
+    grasp, pressed = PhaseEnd.GRASP * coarse, PhaseEnd.PRESSED * coarse
+    reach = _resampled(nodes[: grasp + 1], PhaseEnd.GRASP * slices + 1)[1:]
+    press = _resampled(nodes[grasp + 1 : pressed + 1], slices)
+    opening = _resampled(nodes[pressed:], slices + 1)[1:]
     return np.concatenate([reach, press, opening])
 
 

@@ -1,6 +1,6 @@
-"""The planner's world: a configuration of robot and door with 13 degrees of freedom.
+"""The planner's world: robot and door in one configuration, with the degrees of freedom of both.
 
-Only what moves and what may collide is taken over from the model of the PR2: the solver copies the
+Only what moves and what may collide is taken over from the robot's model: the solver copies the
 whole configuration for every time step.
 """
 
@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rotation import quaternion_from_matrix
 from kmn_skill.planning.clearance import Box, Surface, sample_surface
+from kmn_skill.planning.layout import ARM, HANDLE
+from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import GraspSettings
 
 PADS, CONTACTS = ("left_pad", "right_pad"), ("left_contact", "right_contact")
 TOOL, GRASP, OBJECT = "tool", "grasp", "object"
+STEM = "stem"  # that joins handle and panel
 BISECTIONS = 40  # of the gripper's angle
-MAX_ROUNDING = 0.4  # a corner's radius is at most this part of the box
+MAX_ROUNDING = 0.4  # a corner's radius is limited to this part of the box
 
 
 def door_body(name: str) -> str:
@@ -32,12 +34,10 @@ def door_body(name: str) -> str:
 
 
 class World:
-    """RobotModel and door m(theta, gamma) in a configuration of the package robotic.
+    """Robot and door m(theta, gamma) in a configuration of the package robotic.
 
     Parameters
     ----------
-    model
-        Kinematic model whose two joints are hinge and handle.
     theta, gamma
         (n,) transformation and (m,) configuration parameters.
 
@@ -46,7 +46,7 @@ class World:
     configuration
         With the dofs in the order of `joint_names`.
     joint_names
-        13 names: base x, y, yaw, seven of the left arm, the gripper, hinge and handle.
+        (D,) names: base x, y, yaw, those of the arm, the gripper, hinge and handle.
     model_joints
         The same joints in the configuration, which has one for the base.
     door_bodies
@@ -56,26 +56,22 @@ class World:
     """
 
     def __init__(
-        self,
-        model: KinematicModel,
-        theta: NDArray[np.float64],
-        gamma: NDArray[np.float64],
-        robot: RobotModel,
-        grasp: GraspSettings,
+        self, setup: PlanningSetup, theta: NDArray[np.float64], gamma: NDArray[np.float64]
     ) -> None:
-        self.joint_names = (*robot.joint_names, *(joint.name for joint in model.joints))
+        model, robot = setup.model, setup.robot
+        self.setup, self._gamma = setup, gamma
+        self.joint_names = setup.joint_names
         self.model_joints = (*robot.model_joints, *(joint.name for joint in model.joints))
         self.door_bodies = tuple(joint.body for joint in model.joints)
-        self._model, self._gamma = model, gamma
         self.configuration = ry.Config()
         self.configuration.addFrame("world")
         _add_robot(self.configuration, robot)
         _add_door(self.configuration, model, theta, gamma)
-        self._add_contacts(model, gamma, robot, grasp)
+        self._add_contacts()
         self.configuration.selectJoints(list(self.model_joints))
 
     def limits(self) -> NDArray[np.float64]:
-        """Return the lower and upper limits (2, 13) of the dofs; infinite where there are none."""
+        """Return the lower and upper limits (2, D) of the dofs; infinite where there are none."""
         limits = np.array(self.configuration.getJointLimits(), dtype=np.float64)
         limits = limits if limits.shape[0] == 2 else limits.T
         free = limits[0] > limits[1]
@@ -83,7 +79,7 @@ class World:
         return limits
 
     def poses(self, positions: NDArray[np.float64], frames: list[str]) -> NDArray[np.float64]:
-        """Return the poses (N, F, 4, 4) of frames at positions (N, 13) of the dofs."""
+        """Return the poses (N, F, 4, 4) of frames at positions (N, D) of the dofs."""
         handles = [self.configuration.getFrame(name) for name in frames]
         poses = np.empty((len(positions), len(frames), 4, 4))
         for pose, q in zip(poses, positions, strict=True):
@@ -91,51 +87,34 @@ class World:
             pose[:] = [handle.getTransform() for handle in handles]
         return poses
 
-    def door_boxes(self, stem: float) -> dict[str, Box]:
-        """Return the boxes of the door's bodies, and the stem between handle and panel.
-
-        Parameters
-        ----------
-        stem
-            Thickness of the stem, metres.
-        """
-        model, gamma = self._model, self._gamma
+    def door_boxes(self) -> dict[str, Box]:
+        """Return the boxes of the door's bodies, and of the `STEM` if it has one."""
+        model, gamma = self.setup.model, self._gamma
         found = {
             body.name: Box(door_body(body.name), np.zeros(3), body.size(gamma))
             for body in model.bodies
         }
-        joint = model.joints[1]
-        panel, handle = (
-            next(body for body in model.bodies if body.name == name) for name in self.door_bodies
-        )
-        start = handle.centre(gamma)[0] + handle.size(gamma)[0] / 2.0
-        end = panel.centre(gamma)[0] - panel.size(gamma)[0] / 2.0
-        pivot = joint.origin(gamma)
-        centre = np.array([(start + end) / 2.0 - pivot[0], 0.0, 0.0])
-        found["stem"] = Box(joint.name, centre, np.array([end - start, stem, stem]))
+        if model.stem is not None:
+            joint = model.stem.joint
+            centre, size = model.stem.cuboid(gamma)
+            found[STEM] = Box(joint.name, centre - joint.origin(gamma), size)
         return found
 
-    def _add_contacts(
-        self,
-        model: KinematicModel,
-        gamma: NDArray[np.float64],
-        robot: RobotModel,
-        grasp: GraspSettings,
-    ) -> None:
+    def _add_contacts(self) -> None:
         """Add the two points of the gripper, those of the handle, and the frames between them."""
-        body = next(body for body in model.bodies if body.name == grasp.body)
-        joint = next(joint for joint in model.joints if joint.body == grasp.body)
+        model, robot, gamma = self.setup.model, self.setup.robot, self._gamma
+        grasp, joint = self.setup.settings.grasp, model.joints[HANDLE]
+        body = model.body(grasp.body)
         centre = body.centre(gamma) + grasp.offset - joint.origin(gamma)
-        half = np.zeros(3)
-        half[grasp.axis] = body.size(gamma)[grasp.axis] / 2.0
+        half = np.where([axis == grasp.axis for axis in "xyz"], body.size(gamma) / 2.0, 0.0)
         _add(self.configuration, GRASP, joint.name, centre)
         for name, side in zip(CONTACTS, (half, -half), strict=True):
             _add(self.configuration, name, joint.name, centre + side)
-        for name, pad in zip(PADS, robot.pads, strict=True):
-            _add(self.configuration, name, pad.joint, pad.point)
-        self.configuration.selectJoints([robot.gripper])
+        for name, pad in zip(PADS, robot.planning.pads, strict=True):
+            _add(self.configuration, name, pad.joint, np.array(pad.point))
+        self.configuration.selectJoints([robot.gripper.joint])
         self.touching = self._close(2.0 * float(np.linalg.norm(half)))
-        hand = robot.joint_names[-2]
+        hand = robot.joint_names[ARM][-1]
         left, right = (self.configuration.getFrame(name).getPosition() for name in PADS)
         pose = self.configuration.getFrame(hand).getTransform()
         middle = pose[:3, :3].T @ ((left + right) / 2.0 - pose[:3, 3])
@@ -152,19 +131,23 @@ class World:
         return float(low)
 
 
+@cache
 def boxes(robot: RobotModel) -> dict[str, Box]:
     """Return the box about the meshes of each body of the robot, in its joint's frame."""
     found = {}
     for name, (vertices, _) in _meshes(robot).items():
         low, high = vertices.min(axis=0), vertices.max(axis=0)
-        found[name] = Box(robot.bodies[name].joint, (low + high) / 2.0, high - low)
+        found[name] = Box(robot.planning.bodies[name].joint, (low + high) / 2.0, high - low)
     return found
 
 
+@cache
 def surfaces(robot: RobotModel, spacing: float) -> dict[str, Surface]:
     """Return points on the meshes of each body of the robot, ``spacing`` apart (m)."""
     return {
-        name: Surface.of(robot.bodies[name].joint, sample_surface(vertices, triangles, spacing))
+        name: Surface.of(
+            robot.planning.bodies[name].joint, sample_surface(vertices, triangles, spacing)
+        )
         for name, (vertices, triangles) in _meshes(robot).items()
     }
 
@@ -174,7 +157,7 @@ def _meshes(robot: RobotModel) -> dict[str, tuple[NDArray[np.float64], NDArray[n
     """Return vertices (V, 3) and triangles (F, 3) of each body, in its joint's frame."""
     source = _source(robot)
     found = {}
-    for name, body in robot.bodies.items():
+    for name, body in robot.planning.bodies.items():
         origin = np.linalg.inv(source.getFrame(body.joint).getTransform())
         vertices, triangles, count = [], [], 0
         for part in body.meshes:
@@ -203,7 +186,7 @@ def _source(robot: RobotModel) -> Any:
 def _add_robot(configuration: Any, robot: RobotModel) -> None:
     """Add the robot's joints and a box about each of its bodies."""
     source = _source(robot)
-    joints = [*robot.model_joints, *robot.followers]
+    joints = [*robot.model_joints, *robot.gripper.followers]
     for name in joints:
         frame = source.getFrame(name)
         carrier = frame.getParent()
@@ -216,7 +199,7 @@ def _add_robot(configuration: Any, robot: RobotModel) -> None:
         _add(configuration, f"{name}_origin", carrier.name, offset[:3, 3], offset[:3, :3])
         _add_joint(configuration, frame, robot)
     for name, box in boxes(robot).items():
-        radius = min(robot.rounding, MAX_ROUNDING * box.size.min())
+        radius = min(robot.planning.rounding, MAX_ROUNDING * box.size.min())
         _add(configuration, name, box.frame, box.centre).setShape(ry.ST.ssBox, [*box.size, radius])
 
 
@@ -226,8 +209,8 @@ def _add_joint(configuration: Any, frame: Any, robot: RobotModel) -> None:
     options: dict[str, Any] = {"scale": attributes.get("joint_scale", 1.0)}
     if "limits" in attributes:
         options["limits"] = attributes["limits"]
-    if frame.name in robot.followers:
-        options["mimic"] = configuration.getFrame(robot.gripper)
+    if frame.name in robot.gripper.followers:
+        options["mimic"] = configuration.getFrame(robot.gripper.joint)
     joint.setJoint(frame.getJointType(), **options)
 
 

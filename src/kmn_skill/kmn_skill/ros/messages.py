@@ -6,12 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from builtin_interfaces.msg import Duration as DurationMessage
-from builtin_interfaces.msg import Time as TimeMessage
 from geometry_msgs.msg import Point
 from numpy.typing import NDArray
-from rclpy.duration import Duration
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -21,28 +17,19 @@ from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import MessageError, cube_marker
-from kmn_skill.execution.opening import SUCCESS, Result
+from kmn_perception.ros.stamps import duration_of, seconds, stamp_of
+from kmn_skill.execution.goal import SUCCESS, Result
 from kmn_skill.execution.perceived_door import DoorObservation
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import Sample
 from kmn_skill.planning.kinematics import moved_cubes
+from kmn_skill.planning.layout import BASE_POSITION, HANDLE
 from kmn_skill.planning.plan import Plan
 
-NANO = 1e-9
 PATH_WIDTH = 0.02  # metres
 BASE_COLOUR = ColorRGBA(r=0.36, g=0.61, b=0.94, a=1.0)
 HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
 DOOR_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=0.3)
-
-
-def seconds(stamp: TimeMessage) -> float:
-    """Return a stamp in seconds."""
-    return float(NANO * Time.from_msg(stamp).nanoseconds)
-
-
-def stamp_of(time: float) -> TimeMessage:
-    """Return the stamp of a time in seconds."""
-    return Time(nanoseconds=round(time / NANO)).to_msg()
 
 
 def observation_from_message(message: MorphingParameters) -> DoorObservation:
@@ -90,7 +77,7 @@ def trajectory_from_part(part: Part, names: Sequence[str]) -> JointTrajectory:
         JointTrajectoryPoint(
             positions=positions.tolist(),
             velocities=velocities.tolist(),
-            time_from_start=_duration(float(time)),
+            time_from_start=duration_of(float(time)),
         )
         for time, positions, velocities in zip(*part[1:], strict=True)
     ]
@@ -118,8 +105,8 @@ def markers_from_plan(
     plan: Plan, model: KinematicModel, values: NDArray[np.float64], header: Header
 ) -> MarkerArray:
     """Draw the paths of base and handle as lines, and the door as it will stand."""
-    base = np.column_stack([plan.positions[:, :2], np.zeros(len(plan.times))])
-    handle = [body.name for body in model.bodies].index(model.joints[1].body)
+    base = np.column_stack([plan.positions[:, BASE_POSITION], np.zeros(len(plan.times))])
+    handle = [body.name for body in model.bodies].index(model.joints[HANDLE].body)
     cubes = [moved_cubes(model, values, angles) for angles in plan.door]
     levers = np.array([each[handle][:3, 3] for each in cubes])
     markers = [
@@ -140,7 +127,3 @@ def _line(header: Header, name: str, points: NDArray[np.float64], colour: ColorR
     marker.color = colour
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in points.tolist()]
     return marker
-
-
-def _duration(time: float) -> DurationMessage:
-    return Duration(nanoseconds=round(time / NANO)).to_msg()

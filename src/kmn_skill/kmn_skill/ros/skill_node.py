@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 import traceback
@@ -31,21 +30,28 @@ from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros.stamps import seconds
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.errors import DoorError
-from kmn_skill.execution.opening import SUCCESS, DoorOpening, Feedback, Goal, Result
+from kmn_skill.execution.goal import SUCCESS, Goal, Result
+from kmn_skill.execution.opening import DoorOpening, Knowledge
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.plan_execution import Part
-from kmn_skill.execution.states import StateWatch
+from kmn_skill.execution.states import DOOR, ROBOT, StateWatch
 from kmn_skill.planning.plan import Plan
 from kmn_skill.planning.planner import Planner
-from kmn_skill.planning.robot import RobotModel
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.ros import messages
+from kmn_skill.ros.change_warnings import ChangeWarnings
+from kmn_skill.ros.goal_client import GoalClient
 from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics
 
-FEEDBACK_PERIOD = 0.1  # seconds
 QUEUE_DEPTH = 10
+POLL_PERIOD = 0.05  # seconds
+GOAL_TIMEOUT = 10.0  # seconds in which a goal ends when the node does
+FAREWELL = 0.5  # seconds in which its client then may ask for the result
 
 
 class SkillNode(Node):
@@ -62,40 +68,51 @@ class SkillNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
         self._settings = settings = SkillNodeSettings.check(declare_parameters(self, "skill_node"))
-        robot_joints = RobotModel.load().joint_names
+        setup = PlanningSetup.load(settings.model)
         self._joints = {
-            "joint_states": robot_joints,
-            "door_state": tuple(joint.name for joint in settings.model.joints),
+            ROBOT: setup.robot.joint_names,
+            DOOR: tuple(joint.name for joint in settings.model.joints),
         }
-        self._door = PerceivedDoor(settings.model, settings.world_frame, settings.door)
-        self._memory = DoorMemory()
-        self._watch = StateWatch(settings.states, robot_joints)
+        self._knowledge = Knowledge(
+            settings.model,
+            PerceivedDoor(settings.model, settings.world_frame, settings.door),
+            DoorMemory(),
+            StateWatch(settings.states, self._joints),
+        )
         self._ending = ExitStack()
-        self._planner = self._ending.enter_context(Planner(settings.skill))
+        planner = Planner(setup, Prototypes.load(), settings.planning_time)
+        self._planner = self._ending.enter_context(planner)
         self._statistics = SkillStatistics()
-        self._warnings = ThrottledWarnings(self)
-        self._busy, self._closing = False, False
+        self._warnings, self._refusals = ThrottledWarnings(self), ChangeWarnings(self)
+        self._busy, self._closing = False, threading.Event()
         self._worker: threading.Thread | None = None  # of the goal
-        self._fed_back, self._phase = 0.0, ""
         self._connect()
         self.add_on_set_parameters_callback(self._on_parameters)
         self.get_logger().info(f"opening doors of model '{settings.model.name}'")
 
     def close(self) -> None:
-        """End the goal that runs, and let the robot hold; the executor must go on meanwhile."""
-        self._closing = True
-        if self._worker is not None:
-            self._worker.join()
+        """Let the robot hold and the client of a goal get its result.
+
+        Meanwhile the executor must go on.
+        """
+        self._closing.set()
+        if self._busy:
+            deadline = time.monotonic() + GOAL_TIMEOUT
+            while self._busy and time.monotonic() < deadline:
+                time.sleep(POLL_PERIOD)
+            time.sleep(FAREWELL)
 
     def destroy_node(self) -> None:
         """Let the robot hold, and end the planner and the node."""
-        self.close()
+        self._closing.set()
+        if self._worker is not None:
+            self._worker.join()
         self._ending.close()
         super().destroy_node()
 
     def now(self) -> float:
         """Return the present time of the node's clock, seconds."""
-        return messages.seconds(self.get_clock().now().to_msg())
+        return seconds(self.get_clock().now().to_msg())
 
     def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
         """Publish a plan as markers."""
@@ -114,8 +131,8 @@ class SkillNode(Node):
 
     def send(self, part: Part) -> None:
         """Publish a part of a plan."""
-        joints = self._joints["joint_states"]
-        self._trajectory_publisher.publish(messages.trajectory_from_part(part, joints))
+        message = messages.trajectory_from_part(part, self._joints[ROBOT])
+        self._trajectory_publisher.publish(message)
 
     def hold(self) -> None:
         """Let the robot hold where it is."""
@@ -150,26 +167,29 @@ class SkillNode(Node):
         try:
             sample = messages.sample_from_state(message, self._joints[topic])
         except MessageError as error:
-            self._refuse(f"{topic}_{error.reason}", f"{topic} refused: {error}")
+            self._refuse(topic, f"{topic}_{error.reason}", error)
             return
-        breaks = self._watch.breaks
-        self._watch.put(topic, sample)
-        if self._watch.breaks != breaks:
-            self._door.forget(sample.time)
-            self._memory.forget()
-            self._warnings.warn("break", f"another world: {self._watch.last_break}")
+        self._refusals.clear(topic)
+        _, door, memory, watch = self._knowledge
+        breaks = watch.breaks
+        watch.put(topic, sample)
+        if watch.breaks != breaks:
+            door.forget(sample.time)
+            memory.forget()
+            self._warnings.warn("break", f"another world: {watch.last_break}")
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
         try:
-            self._door.add(messages.observation_from_message(message))
+            self._knowledge.door.add(messages.observation_from_message(message))
         except DoorError as error:
-            self._refuse(error.reason, f"morphing_parameters refused: {error}")
+            self._refuse("morphing_parameters", error.reason, error)
         else:
+            self._refusals.clear("morphing_parameters")
             self._statistics.use()
 
     def _on_goal(self, request: OpenDoor.Goal) -> GoalResponse:
         """Accept a goal if none runs; whether it can be reached is for its result to tell."""
-        if not self._busy and not self._closing:
+        if not self._busy and not self._closing.is_set():
             self._busy = True
             return GoalResponse.ACCEPT
         text = "goal rejected: another one runs, which must end or be cancelled first"
@@ -185,7 +205,9 @@ class SkillNode(Node):
         done.add_done_callback(lambda _: executor.wake())
         self._worker = threading.Thread(target=self._work, args=(goal_handle, done), name="goal")
         self._worker.start()
-        return messages.result_message(await done)
+        result: Result = await done
+        self._busy = False
+        return messages.result_message(result)
 
     def _work(self, goal_handle: ServerGoalHandle, done: Future) -> None:
         request = goal_handle.request
@@ -193,28 +215,19 @@ class SkillNode(Node):
         try:
             self._finish(goal_handle, result)
         finally:
-            self._busy = False
             done.set_result(result)
 
     def _open(self, goal_handle: ServerGoalHandle, goal: Goal) -> Result:
         settings = self._settings
+        client = GoalClient(goal_handle, self._closing, self._statistics)
         opening = DoorOpening(
-            settings.model,
-            self._door,
-            self._memory,
-            self._watch,
-            self._planner,
-            self,
-            settings.opening,
-            settings.execution,
-            cancelled=lambda: self._closing or goal_handle.is_cancel_requested,
-            feedback=partial(self._feed_back, goal_handle),
+            self._knowledge, self._planner, self, client, settings.opening, settings.execution
         )
         try:
             return opening.run(goal)
         except Exception as error:  # a node never dies of a goal
             self.get_logger().error(traceback.format_exc())
-            return Result("internal_error", repr(error), math.nan, math.nan, None, 0, math.nan)
+            return Result("internal_error", repr(error))
 
     def _finish(self, goal_handle: ServerGoalHandle, result: Result) -> None:
         self._statistics.finish(result)
@@ -228,22 +241,13 @@ class SkillNode(Node):
         else:
             goal_handle.abort()
 
-    def _feed_back(self, goal_handle: ServerGoalHandle, feedback: Feedback) -> None:
-        """Publish what is being done, but not more often than once in a period for each phase."""
-        now = time.monotonic()
-        if feedback.phase == self._phase and now - self._fed_back < FEEDBACK_PERIOD:
-            return
-        self._phase, self._fed_back = feedback.phase, now
-        self._statistics.enter(feedback.phase)
-        goal_handle.publish_feedback(OpenDoor.Feedback(**feedback._asdict()))
-
-    def _refuse(self, reason: str, text: str) -> None:
+    def _refuse(self, topic: str, reason: str, error: Exception) -> None:
         self._statistics.refuse(reason)
-        self._warnings.warn(reason, text)
+        self._refusals.warn(topic, reason, f"{topic} refused: {error}")
 
     def _report(self) -> list[DiagnosticStatus]:
         try:
-            self._door.values(self.now())
+            self._knowledge.door.values(self.now())
             doubt = ""
         except DoorError as error:
             doubt = str(error)
@@ -259,7 +263,8 @@ class SkillNode(Node):
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
-        self._door.settings, self._watch.settings = settings.door, settings.states
+        self._knowledge.door.settings = settings.door
+        self._knowledge.watch.settings = settings.states
         return SetParametersResult(successful=True)
 
 

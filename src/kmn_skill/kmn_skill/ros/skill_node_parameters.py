@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from kmn_perception.configuration.node_parameters import ParameterError
@@ -13,7 +13,6 @@ from kmn_skill.execution.opening import OpeningSettings
 from kmn_skill.execution.perceived_door import AcceptanceSettings
 from kmn_skill.execution.plan_execution import ExecutionSettings
 from kmn_skill.execution.states import StateSettings
-from kmn_skill.planning.settings import SkillSettings
 
 JOINTS = 2  # hinge and handle
 
@@ -28,15 +27,15 @@ class SkillNodeSettings:
         Kinematic model of the door.
     world_frame
         Frame that the door must be given in.
-    skill
-        Settings of the planner.
+    planning_time
+        Seconds for a plan.
     door, states, execution, opening
         Settings of the four.
     """
 
     model: KinematicModel
     world_frame: str
-    skill: SkillSettings
+    planning_time: float
     door: AcceptanceSettings
     states: StateSettings
     execution: ExecutionSettings
@@ -57,12 +56,10 @@ class SkillNodeSettings:
                 f"'model' must be that of a door with a hinge and a handle, "
                 f"'{model.name}' has {len(model.joints)} joints"
             )
-        skill = SkillSettings.load()
-        planner = skill.planner._replace(time_limit=values["planning_time"])
         return cls(
             model=model,
             world_frame=values["world_frame"],
-            skill=replace(skill, planner=planner),
+            planning_time=values["planning_time"],
             door=pick(AcceptanceSettings, values),
             states=pick(StateSettings, values),
             execution=pick(ExecutionSettings, values),

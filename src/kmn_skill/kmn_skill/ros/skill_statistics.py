@@ -8,7 +8,7 @@ from collections import Counter
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from kmn_perception.ros.reports import make_status
-from kmn_skill.execution.opening import SUCCESS, Result
+from kmn_skill.execution.goal import SUCCESS, Result
 
 
 class SkillStatistics:

@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import torch
 from rclpy.node import Node
 
 from kmn_perception.benchmark import stages, transport
@@ -15,12 +14,11 @@ from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.estimator import MorphEstimator
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.parameters import declare_parameters
 from kmn_perception.ros.program import own_arguments, ros_session
-
-THREADS = 1  # of torch; as morph_node sets it
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
@@ -41,13 +39,13 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
     """Measure stages and transport with the parameters of morph_node, as written to JSON."""
     settings = MorphNodeSettings.check(declare_parameters(node, "morph_node"))
-    torch.set_num_threads(THREADS)
+    use_one_thread()
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)
     chain, points = stages.chain(MorphPipeline(estimator, settings.pipeline), settings, cloud)
     print(
         f"{estimator.model.name}: {points} points of {cloud.width} x {cloud.height}; "
-        f"torch on {THREADS} thread"
+        "torch on 1 thread"
     )
     return {
         "stages": stages.measure(chain, frames),

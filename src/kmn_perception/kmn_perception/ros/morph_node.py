@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import torch
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -22,6 +21,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.estimator import Estimate, MorphEstimator, Status
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
 from kmn_perception.ros.frame_receiver import Frame, FrameReceiver, read_cloud
 from kmn_perception.ros.frame_statistics import FrameStatistics
@@ -221,7 +221,7 @@ def _none(model: KinematicModel, reason: str) -> DetectedObject:
 
 def _load(settings: MorphNodeSettings) -> MorphPipeline:
     """Load model and weights, ready for the first frame."""
-    torch.set_num_threads(1)  # more are slower for these small networks
+    use_one_thread()
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()

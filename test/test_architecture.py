@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[1]
 # Rooms of each package, tier by tier: a module imports from its own room and from lower tiers.
 TIERS = {
     "kmn_perception": (
-        ("configuration", "command_line"),
-        ("model",),
+        ("configuration",),
+        ("command_line", "model"),
         ("scene", "network", "refinement"),
         ("estimator",),
         ("pipeline",),

@@ -26,6 +26,9 @@ WORDS = {  # of pydantic, and of those who write YAML
     "a valid string": "a text",
     "a valid array": "a list",
     "an object": "keys and values",
+    "Tuple should have": "must have",
+    "List should have": "must have",
+    " after validation": "",
     "a valid dictionary": "keys and values",
 }
 

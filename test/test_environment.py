@@ -38,7 +38,7 @@ def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
         AMENT_PREFIX_PATH=str(tmp_path),
         LD_LIBRARY_PATH=f"{tmp_path}:{tmp_path}/cuda",
     )
-    assert "nowhere: no such bag" in ended.stderr
+    assert "nowhere: no such bag" in ended.stderr, ended.stderr + ended.stdout
     assert f"libraries {tmp_path}/cuda\n" in ended.stdout
 
 

@@ -5,7 +5,7 @@
 
 if [[ $1 == wheels || ${ROS_DISTRO:-} != jazzy ]]; then
     unset PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH ROS_DISTRO ROS_VERSION
-    unset ROS_PYTHON_VERSION
+    unset ROS_PYTHON_VERSION _ROS_WHEELS_BOOTSTRAP_COMPLETE # with which the wheels find their libraries
     libraries=
     while IFS= read -r -d : folder; do # libraries of CUDA and the like stay
         [[ -z $folder || -e $folder/librcl.so ]] || libraries+=${libraries:+:}$folder

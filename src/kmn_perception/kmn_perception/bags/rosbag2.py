@@ -36,7 +36,7 @@ _OFFERED_QOS = Qos(
 )
 
 
-class BagError(Exception):
+class BagError(ValueError):
     """A bag that cannot be read or written; the text says what was wrong and what was expected."""
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 import rclpy
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.signals import SignalHandlerOptions
@@ -21,7 +21,7 @@ from rclpy.utilities import try_shutdown
 
 from kmn_perception.ros.node_process import ProcessError
 
-EXPECTED = (OSError, ValueError, ParameterException, ProcessError)
+EXPECTED = (OSError, ValueError, ParameterException, NameValidationException, ProcessError)
 ROS_ARGUMENTS, END_OF_ROS_ARGUMENTS = "--ros-args", "--"
 
 

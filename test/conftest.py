@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import domain_coordinator
 import pytest
 from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -18,6 +20,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.ros.morph_node import MorphNode
+from talk import write_talk
 
 
 class Client(GraphClient):
@@ -110,3 +113,21 @@ def restored(client: Client, node: MorphNode) -> Iterator[None]:
     values = {name: node.get_parameter(name).value for name in changeable}
     yield
     assert client.set(**values).successful
+
+
+@pytest.fixture
+def player(domain: int) -> Iterator[Node]:
+    """Return the node that replays, and that listens to what is replayed."""
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("player", context=context)
+    yield node
+    node.destroy_node()
+    context.shutdown()
+
+
+@pytest.fixture
+def talk(tmp_path: Path) -> Path:
+    """Write a bag in which two topics talk by turns."""
+    write_talk(tmp_path / "talk")
+    return tmp_path / "talk"

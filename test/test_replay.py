@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import re
-import signal
-import subprocess
-import sys
-import time
 from array import array
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from ament_index_python.packages import get_package_prefix
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
@@ -36,69 +25,14 @@ from std_msgs.msg import String
 
 from kmn_perception.bags import replay as replay_module
 from kmn_perception.bags.replay import Replay
-from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
+from kmn_perception.bags.rosbag2 import BagError, write_bag
+from talk import PATIENCE, STRING, listen, said, spin_until, write_talk
 
-STRING = "std_msgs/msg/String"
-REPLAY = [sys.executable, "-m", "kmn_perception", "replay"]
-PATIENCE = 20.0  # seconds; far more than anything here takes
-QUEUE_DEPTH = 100
 NO_LIMIT = QosTime(9223372036, 854775807)
 
 
-@pytest.fixture
-def player(domain: int) -> Iterator[Node]:
-    """Return the node that replays, and that listens to what is replayed."""
-    context = Context()
-    context.init(domain_id=domain)
-    node = Node("player", context=context)
-    yield node
-    node.destroy_node()
-    context.shutdown()
-
-
-def listen(
-    node: Node, message_type: Any, topic: str, qos: QoSProfile | int = QUEUE_DEPTH
-) -> list[Any]:
-    """Return the list of all that will be heard of a topic."""
-    heard: list[Any] = []
-    node.create_subscription(message_type, topic, heard.append, qos)
-    return heard
-
-
-def spin_until(node: Node, done: Callable[[], bool]) -> bool:
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    deadline = time.monotonic() + PATIENCE
-    while not done() and time.monotonic() < deadline:
-        executor.spin_once(timeout_sec=0.05)
-    return done()
-
-
-def _said(topic: str, milliseconds: int, text: str) -> Message:
-    return Message(topic, 10**18 + milliseconds * 10**6, serialize_message(String(data=text)))
-
-
-def _write_talk(bag: Path) -> list[Message]:
-    """Write a bag in which two topics talk by turns; return its messages in recorded order."""
-    talk = [
-        _said("/a", 0, "a0"),
-        _said("/b", 10, "b0"),
-        _said("/a", 20, "a1"),
-        _said("/a", 70, "a2"),
-        _said("/b", 200, "b1"),
-    ]
-    write_bag(bag, {"/a": STRING, "/b": STRING}, reversed(talk))
-    return talk
-
-
-@pytest.fixture
-def talk(tmp_path: Path) -> Path:
-    _write_talk(tmp_path / "talk")
-    return tmp_path / "talk"
-
-
 def test_every_message_arrives_as_it_was_recorded(player: Node, tmp_path: Path) -> None:
-    talk = _write_talk(tmp_path / "talk")
+    talk = write_talk(tmp_path / "talk")
     a, b = listen(player, String, "a"), listen(player, String, "b")
     replay = Replay(player, tmp_path / "talk")
     assert replay.wait_for_subscriber(PATIENCE)
@@ -238,80 +172,10 @@ def test_a_gap_of_years_is_skipped_with_a_message(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     year = 365 * 24 * 3600 * 1000
-    said = [_said("/a", 0, "a0"), _said("/a", year, "a1"), _said("/a", year + 50, "a2")]
-    write_bag(tmp_path / "bag", {"/a": STRING}, said)
+    messages = [said("/a", 0, "a0"), said("/a", year, "a1"), said("/a", year + 50, "a2")]
+    write_bag(tmp_path / "bag", {"/a": STRING}, messages)
     clock = Clock()
     monkeypatch.setattr(replay_module, "time", clock)
     published = [clock.now - 100.0 for _ in Replay(player, tmp_path / "bag").play()]
     assert published == pytest.approx([0.0, 0.0, 0.050])
     assert "skipping a gap of 8760.0 hours" in capfd.readouterr().err
-
-
-def test_the_readmes_line_replays_under_another_name(player: Node, tmp_path: Path) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-    (line,) = re.findall(
-        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
-    )
-    package, executable, bag, *arguments = line.split()
-    write_bag(
-        tmp_path / bag,
-        {"/camera/depth/points": STRING},
-        [_said("/camera/depth/points", 0, "hello")],
-    )
-    heard = listen(player, String, "/points")
-    installed = f"{get_package_prefix(package)}/lib/{package}/{executable}"
-    process = subprocess.Popen(
-        [installed, bag, *arguments],
-        cwd=tmp_path,
-        env={**os.environ, "ROS_DOMAIN_ID": str(player.context.get_domain_id())},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert spin_until(player, lambda: bool(heard)), process.communicate()[1]
-    assert heard[0].data == "hello"
-    assert process.wait(timeout=60) == 0
-
-
-def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*REPLAY, *arguments],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["nowhere"], "nowhere: no such bag"),
-        (["BAG", "--rate", "0"], "0 is not a positive number"),
-        (["BAG", "--rate", "nan"], "nan is not a positive number"),
-        (["BAG", "--topics", "/points"], "no topic /points; the bag holds /a, /b"),
-        (["BAG", "--topic-map", "/a=/b"], "/a=/b is not of the form FROM:=TO"),
-        (["BAG", "--topic-map", "/a:=no good"], "Invalid topic name"),
-    ],
-)
-def test_bad_arguments_end_with_a_message(
-    arguments: list[str], message: str, domain: int, talk: Path
-) -> None:
-    process = _run_replay(domain, *[str(talk) if text == "BAG" else text for text in arguments])
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode in (1, 2)
-    assert message in errors
-    assert "Traceback" not in errors
-
-
-def test_ctrl_c_ends_an_endless_replay_without_a_traceback(
-    domain: int, player: Node, talk: Path
-) -> None:
-    heard = listen(player, String, "a")
-    process = _run_replay(domain, str(talk), "--loop")
-    try:
-        assert spin_until(player, lambda: len(heard) > 6), "it does not start again at the end"
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert process.returncode == 0
-    assert "Traceback" not in errors

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
-from sim_client import SimClient
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -19,6 +18,7 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.ros.messages import camera_from_info, depth_from_image, points_from_cloud
 from kmn_perception.ros.stamps import seconds, stamp_of
+from sim_client import SimClient
 
 pytest.importorskip("pybullet")
 from kmn_sim.ros.sim_node import SimNode  # noqa: E402

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
+
 from recordings import duration
 from sim_client import SimClient
 

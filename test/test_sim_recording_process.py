@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from recordings import duration
 from test_sim_node_process import COMMAND
 
 from graph import GraphClient
 from programs import TIMEOUT, parameters, start
+from recordings import duration
 
 ENDINGS = ("gif", "mp4")
 

@@ -35,7 +35,8 @@ SETTINGS = SegmentationSettings(
     cluster_min_points=50,
     cluster_concave_angle=0.5,
 )
-CONCAVE_EDGES = SceneSettings.load().concave_edges
+SCENE = SceneSettings.load()
+CONCAVE_EDGES, RAISED = SCENE.concave_edges, SCENE.raised_plane
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)
 KINECT_V1 = np.array([[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]])
@@ -155,7 +156,9 @@ def test_cloud_clusters_are_the_connected_voxels(voxels: NDArray[np.bool_]) -> N
 
 
 def test_one_carton_is_left_of_a_real_frame(real_frame: Any) -> None:
-    plane = find_support_plane(real_frame.points, SupportPlaneSettings(0.01, np.radians(75.0), 0.2))
+    plane = find_support_plane(
+        real_frame.points, SupportPlaneSettings(0.01, np.radians(75.0), 0.2, RAISED)
+    )
     assert plane is not None
     pose = pose_above(plane, CAMERA.pose)
     found = nearest(real_frame.points, pose, pose[:3, 3])

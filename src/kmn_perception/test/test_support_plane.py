@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera, look_at
 from kmn_perception.model.rendering import depth_to_points, render
+from kmn_perception.scene.settings import SceneSettings
 from kmn_perception.scene.support_plane import (
     SupportPlane,
     SupportPlaneSettings,
@@ -22,7 +23,8 @@ from kmn_perception.scene.support_plane import (
 
 from .conftest import cuboid
 
-SETTINGS = SupportPlaneSettings(distance=0.01, max_tilt=np.radians(75.0), min_fraction=0.2)
+RAISED = SceneSettings.load().raised_plane
+SETTINGS = SupportPlaneSettings(0.01, np.radians(75.0), 0.2, RAISED)
 CAMERA = Camera.load("kinect_v1").resized(160, 120)
 TABLE = cuboid((2.0, 2.0, 0.02), (0.0, 0.0, -0.01))
 BOX = cuboid((0.3, 0.2, 0.25), (0.05, -0.1, 0.125))

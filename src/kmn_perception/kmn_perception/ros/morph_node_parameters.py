@@ -69,6 +69,7 @@ class MorphNodeSettings:
                 f"'crop_min' must be below 'crop_max' along each axis, found "
                 f"{list(values['crop_min'])} and {list(values['crop_max'])}"
             )
+        scene = SceneSettings.load()
         return cls(
             model=values["model"],
             weights=values["weights"],
@@ -82,9 +83,14 @@ class MorphNodeSettings:
             pipeline=PipelineSettings(
                 camera_pose=CameraPose(values["camera_pose"]),
                 given_pose=_pose(values["camera_position"], values["camera_quaternion"]),
-                plane=pick(SupportPlaneSettings, values, "plane_"),
+                plane=SupportPlaneSettings(
+                    values["plane_distance"],
+                    values["plane_max_tilt"],
+                    values["plane_min_fraction"],
+                    scene.raised_plane,
+                ),
                 background=pick(SegmentationSettings, values),
-                scene=SceneSettings.load(),
+                scene=scene,
             ),
         )
 

@@ -73,6 +73,30 @@ class IntrinsicsSettings:
 
 
 @dataclass(frozen=True)
+class RaisedPlaneSettings:
+    """When a level plane above the largest one, as a table above the floor, is the support.
+
+    Attributes
+    ----------
+    min_rise
+        Height above the largest plane, metres; lower ones are tops of objects on it.
+    max_angle
+        Between the normals of the two, radians.
+    max_object, min_standing
+        Height (metres) up to which what is seen above a plane stands on it, and the fraction of the
+        points off the largest plane that must; fewer are noise.
+    margin
+        Fraction of its points that lie beyond each end of a plane's extent.
+    """
+
+    min_rise: NonNegative
+    max_angle: NonNegative
+    max_object: NonNegative
+    min_standing: Fraction
+    margin: Fraction
+
+
+@dataclass(frozen=True)
 class SceneSettings:
     """All of the file.
 
@@ -86,6 +110,7 @@ class SceneSettings:
 
     border_run: Count
     memory: Count
+    raised_plane: RaisedPlaneSettings
     concave_edges: ConcaveEdgeSettings
     occlusion: OcclusionSettings
     stacking: StackingSettings

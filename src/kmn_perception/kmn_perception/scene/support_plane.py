@@ -8,16 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.scene.settings import RaisedPlaneSettings
+
 SEED = 0
 HYPOTHESES = 256  # finds a plane of 30 % of the points with a probability of 99.9 %
 SCORED_POINTS = 1024
 FITTED_POINTS = 8192
 REFINEMENTS = 3
-MIN_RISE = 0.3  # metres; level surfaces that lie less above a support are tops of objects on it
-PARALLEL = np.cos(np.radians(5.0))  # between the normals of two level surfaces
-MAX_OBJECT = 0.5  # metres above a surface up to which what is seen stands on it
-MIN_STANDING = 0.01  # of the points off the largest plane; fewer above a surface are noise
-EXTENT = (2.0, 98.0)  # percentiles; a surface reaches from one to the other
 IMAGE_UP = np.array([0.0, -1.0, 0.0])  # in the optical frame (REP-103: x right, y down, z forward)
 
 
@@ -35,11 +32,14 @@ class SupportPlaneSettings:
     min_fraction : float
         Minimum share of the measured points that lie on the plane, 0..1; for a higher plane, of
         those that do not lie on the largest one.
+    raised : RaisedPlaneSettings
+        When a plane above the largest one is the support.
     """
 
     distance: float
     max_tilt: float
     min_fraction: float
+    raised: RaisedPlaneSettings
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def find_support_plane(
     for height in _heights_of_surfaces(rest, support, settings):
         raised = SupportPlane(support.normal, support.height - height)
         plane = _fit(rest, raised, settings)
-        if plane is None or plane.normal @ support.normal < PARALLEL:
+        if plane is None or plane.normal @ support.normal < np.cos(settings.raised.max_angle):
             continue
         if _something_stands_on(rest, plane, settings):
             return plane
@@ -169,7 +169,7 @@ def _heights_of_surfaces(
     points: NDArray[np.float64], plane: SupportPlane, settings: SupportPlaneSettings
 ) -> list[float]:
     """Return the heights (metres above a plane) at which many points lie level, from the top."""
-    ends = MIN_RISE, plane.height
+    ends = settings.raised.min_rise, plane.height
     bins = int((ends[1] - ends[0]) / settings.distance)
     if bins < 2:
         return []
@@ -187,11 +187,13 @@ def _something_stands_on(
 ) -> bool:
     """Tell whether there are points above a surface, no higher than objects are."""
     level = _level_axes(plane.normal, np.array([0.0, 0.0, 1.0]))[:, :2]
-    low, high = np.percentile(points[_on_plane(points, plane, settings)] @ level, EXTENT, axis=0)
+    raised = settings.raised
+    extent = 100.0 * np.array([raised.margin, 1.0 - raised.margin])
+    low, high = np.percentile(points[_on_plane(points, plane, settings)] @ level, extent, axis=0)
     height, place = points @ plane.normal + plane.height, points @ level
-    above = (height > 3.0 * settings.distance) & (height < MAX_OBJECT)
+    above = (height > 3.0 * settings.distance) & (height < raised.max_object)
     above &= ((place > low) & (place < high)).all(axis=1)
-    return bool(above.mean() >= MIN_STANDING)
+    return bool(above.mean() >= raised.min_standing)
 
 
 @njit(cache=True)

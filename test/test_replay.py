@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -15,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ament_index_python.packages import get_package_prefix
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -245,31 +243,6 @@ def test_a_gap_of_years_is_skipped_with_a_message(
     published = [clock.now - 100.0 for _ in Replay(player, tmp_path / "bag").play()]
     assert published == pytest.approx([0.0, 0.0, 0.050])
     assert "skipping a gap of 8760.0 hours" in capfd.readouterr().err
-
-
-def test_the_readmes_line_replays_under_another_name(player: Node, tmp_path: Path) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-    (line,) = re.findall(
-        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
-    )
-    package, executable, bag, *arguments = line.split()
-    write_bag(
-        tmp_path / bag,
-        {"/camera/depth/points": STRING},
-        [_said("/camera/depth/points", 0, "hello")],
-    )
-    heard = listen(player, String, "/points")
-    installed = f"{get_package_prefix(package)}/lib/{package}/{executable}"
-    process = subprocess.Popen(
-        [installed, bag, *arguments],
-        cwd=tmp_path,
-        env={**os.environ, "ROS_DOMAIN_ID": str(player.context.get_domain_id())},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert spin_until(player, lambda: bool(heard)), process.communicate()[1]
-    assert heard[0].data == "hello"
-    assert process.wait(timeout=60) == 0
 
 
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from ament_index_python.packages import get_package_prefix
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
 
 from kmn_perception import executables
+from kmn_perception.bags.rosbag2 import Message, write_bag
 from kmn_perception.configuration.compile_cache import choose_compile_cache
 from kmn_perception.ros.program import split_arguments
 from programs import BROKEN_FILES, TIMEOUT
@@ -50,6 +57,31 @@ def test_arguments_of_ros_are_those_after_its_mark(
     arguments: list[str], own: list[str], ros: list[str]
 ) -> None:
     assert split_arguments(arguments) == (own, ros)
+
+
+def test_the_readmes_line_replays_under_another_name(
+    graph: Any, domain: int, tmp_path: Path
+) -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    (line,) = re.findall(
+        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
+    )
+    package, executable, bag, *arguments = line.split()
+    said = Message("/camera/depth/points", 10**18, serialize_message(String(data="hello")))
+    write_bag(tmp_path / bag, {said.topic: "std_msgs/msg/String"}, [said])
+    listener = graph.start(lambda context: Node("listener", context=context))
+    heard: list[String] = []
+    listener.create_subscription(String, "/points", heard.append, 10)
+    process = subprocess.Popen(
+        [f"{get_package_prefix(package)}/lib/{package}/{executable}", bag, *arguments],
+        cwd=tmp_path,
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    _, errors = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 0, errors
+    assert graph.wait_for(lambda: heard)[0].data == "hello"
 
 
 @pytest.mark.parametrize(

@@ -1,48 +1,20 @@
-"""The executable ``replay``: the README's line, bad arguments, and how it ends."""
+"""The executable ``replay``: bad arguments, and how it ends."""
 
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_package_prefix
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from kmn_perception.bags.rosbag2 import write_bag
-from talk import STRING, listen, said, spin_until
+from talk import listen, spin_until
 
 REPLAY = [sys.executable, "-m", "kmn_perception", "replay"]
-
-
-def test_the_readmes_line_replays_under_another_name(player: Node, tmp_path: Path) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-    (line,) = re.findall(
-        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
-    )
-    package, executable, bag, *arguments = line.split()
-    write_bag(
-        tmp_path / bag,
-        {"/camera/depth/points": STRING},
-        [said("/camera/depth/points", 0, "hello")],
-    )
-    heard = listen(player, String, "/points")
-    installed = f"{get_package_prefix(package)}/lib/{package}/{executable}"
-    process = subprocess.Popen(
-        [installed, bag, *arguments],
-        cwd=tmp_path,
-        env={**os.environ, "ROS_DOMAIN_ID": str(player.context.get_domain_id())},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert spin_until(player, lambda: bool(heard)), process.communicate()[1]
-    assert heard[0].data == "hello"
-    assert process.wait(timeout=60) == 0
 
 
 def _run_replay(domain: int, *arguments: str) -> subprocess.Popen[str]:

@@ -6,9 +6,13 @@ import signal
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from rclpy.action.client import ActionClient
+from rclpy.node import Node
 
+from kmn_msgs.action import OpenDoor
 from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
@@ -47,6 +51,29 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     while any(map(runs, started)):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_it_answers_the_client_of_the_goal_that_runs(
+    interrupt: signal.Signals, graph: Any, domain: int
+) -> None:
+    client = graph.start(lambda context: Node("client", context=context))
+    action = ActionClient(client, OpenDoor, "open_door")
+    process = start(COMMAND, domain, *parameters("door_timeout:=600.0"))
+    try:
+        read_until("opening doors", process)
+        assert action.wait_for_server(60.0)
+        accepted = action.send_goal_async(OpenDoor.Goal(handle_angle=-0.7, door_angle=-0.9))
+        graph.wait_for(accepted.done)
+        result = accepted.result().get_result_async()
+        process.send_signal(interrupt)
+        graph.wait_for(result.done)
+        printed, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert result.result().result.reason
+    assert (process.returncode, "Traceback" in printed) == (0, False), printed
+    action.destroy()
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_the_result_holds_every_stage_and_the_transport(
     result = json.loads(out.read_text())
     assert set(result) == {"stages", "transport"}
     assert list(result["stages"]) == [
-        "message_to_array", "background_removal", "splat", "network", "predictions",
+        "message_to_view", "background_removal", "splat", "network", "predictions",
         "refinement", "refined_estimate", "callback",
     ]  # fmt: skip
     for times in result["stages"].values():

@@ -71,8 +71,6 @@ def train(options: argparse.Namespace) -> None:
     )  # fmt: skip
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
-    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down several times
-    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
     torch.manual_seed(settings.seed)
     design = Section(settings.design, "training settings: design")
     network = DESIGNS[settings.network].untrained(model, design)
@@ -113,6 +111,8 @@ def _result(training: Training, known: dict[str, Any]) -> weights.Weights:
 def main() -> None:
     """Run the executable; an interrupted run is resumed by the same command."""
     options = arguments()
+    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
+    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
     try:
         train(options)
     except KeyboardInterrupt:

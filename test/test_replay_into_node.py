@@ -49,7 +49,7 @@ def test_frames_from_another_process_are_answered_with_one_object_each(
 ) -> None:
     before = client.report()
     client.answers.clear()
-    command = [sys.executable, "-m", "kmn_perception.bags.replay", str(bag), "--topics", *topics]
+    command = [sys.executable, "-m", "kmn_perception", "replay", str(bag), "--topics", *topics]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
     assert subprocess.run(command, env=environment, timeout=120, check=False).returncode == 0
     stamps = [message.stamp for message in read_messages(bag, topics[:1])]

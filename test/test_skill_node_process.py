@@ -16,7 +16,7 @@ from kmn_msgs.action import OpenDoor
 from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
-
+from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 COMMAND = [sys.executable, "-m", "kmn_skill", "skill_node"]
 
@@ -53,26 +53,12 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
-def test_stopped_it_answers_the_client_of_the_goal_that_runs(
-    interrupt: signal.Signals, graph: Any, domain: int
-) -> None:
+def test_a_destroyed_node_offers_its_action_no_more(graph: Any) -> None:
     client = graph.start(lambda context: Node("client", context=context))
     action = ActionClient(client, OpenDoor, "open_door")
-    process = start(COMMAND, domain, *parameters("door_timeout:=600.0"))
-    try:
-        read_until("opening doors", process)
+    with graph.running(SkillNode):
         assert action.wait_for_server(60.0)
-        accepted = action.send_goal_async(OpenDoor.Goal(handle_angle=-0.7, door_angle=-0.9))
-        graph.wait_for(accepted.done)
-        result = accepted.result().get_result_async()
-        process.send_signal(interrupt)
-        graph.wait_for(result.done)
-        printed, _ = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert result.result().result.reason
-    assert (process.returncode, "Traceback" in printed) == (0, False), printed
+    graph.wait_for(lambda: not action.server_is_ready())
     action.destroy()
 
 

@@ -233,7 +233,7 @@ def test_bad_arguments_end_with_a_message(
 
 
 def test_ctrl_c_ends_it_without_a_traceback() -> None:
-    command = [sys.executable, "-m", "kmn_perception.evaluation.evaluate", "--model", "box_a"]
+    command = [sys.executable, "-m", "kmn_perception", "evaluate", "--model", "box_a"]
     with subprocess.Popen(
         [*command, "--methods", "icp", "--samples", "100000", "--jobs", "2"],
         stderr=subprocess.PIPE,

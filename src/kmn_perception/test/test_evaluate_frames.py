@@ -37,7 +37,7 @@ def _copy(folder: Path, *numbers: int) -> Path:
 
 def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "kmn_perception.experiments.evaluate_frames", *map(str, arguments)],
+        [sys.executable, "-m", "kmn_perception", "evaluate_frames", *map(str, arguments)],
         capture_output=True,
         text=True,
     )

@@ -28,5 +28,12 @@ def test_a_clock_that_was_set_back_counts_once() -> None:
     assert found == [NEW, SUPERSEDED, JUMP, SUPERSEDED, NEW]
 
 
+def test_topics_of_a_recording_may_be_replayed_one_after_the_other() -> None:
+    second = 10**9
+    clouds = [("cloud", t * second) for t in range(2, 9)]
+    images = [("image", stamp) for _, stamp in clouds]
+    assert orders(*clouds, *images) == [NEW] * 7 + [JUMP] + [NEW] * 6
+
+
 def test_messages_without_a_time_are_always_new() -> None:
     assert orders(("cloud", 0), ("image", 0), ("cloud", 0)) == [NEW] * 3

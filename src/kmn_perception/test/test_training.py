@@ -16,7 +16,7 @@ from kmn_perception.training.procedures import load_training_settings
 from kmn_perception.training.samples import sample
 from kmn_perception.training.train import arguments, settings_of
 
-COMMAND = [sys.executable, "-m", "kmn_perception.training.train", "--model", "box_a"]
+COMMAND = [sys.executable, "-m", "kmn_perception", "train", "--model", "box_a"]
 SMALL = ["--samples", "300", "--epochs", "10", "--retrain-epochs", "1", "--rounds", "1"]
 
 

@@ -23,7 +23,7 @@ from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import RunError
 from kmn_perception.training.train import arguments
 
-COMMAND = [sys.executable, "-m", "kmn_perception.training.train", "--model", "box_a"]
+COMMAND = [sys.executable, "-m", "kmn_perception", "train", "--model", "box_a"]
 SMALL = ["--samples", "300", "--epochs", "10", "--retrain-epochs", "1", "--rounds", "1"]
 INPUTS = [InputType((4, 3), np.float16)]
 

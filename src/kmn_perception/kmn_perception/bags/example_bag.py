@@ -92,7 +92,3 @@ def main() -> int:
         return 130
     print(f"The bag is in {options.out}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

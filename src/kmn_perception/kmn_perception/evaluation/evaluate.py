@@ -123,7 +123,3 @@ def main(argv: Sequence[str] | None = None) -> None:
         sys.exit("evaluate: interrupted")
     except (ConfigurationError, MethodError, OSError, WeightsError) as error:
         sys.exit(f"evaluate: {error}")
-
-
-if __name__ == "__main__":
-    main()

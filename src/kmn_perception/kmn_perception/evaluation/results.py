@@ -149,7 +149,3 @@ def main(argv: Sequence[str] | None = None) -> None:
         sys.exit("results: interrupted; the same command goes on with what is missing")
     except (ConfigurationError, MethodError, OSError, WeightsError) as error:
         sys.exit(f"results: {error}")
-
-
-if __name__ == "__main__":
-    main()

@@ -75,7 +75,3 @@ def _report(options: argparse.Namespace) -> None:
         print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
     if options.json:
         write_json(options.json, summary)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from enum import Enum
 
+MAX_LAG = 10**9  # ns that a camera's topics may be apart; beyond it time itself went back
+
 
 class Order(Enum):
     """How a frame follows those that came before it."""
 
     NEW = "new"
     SUPERSEDED = "superseded"  # another source has shown this moment, or a later one
-    CLOCK_JUMP = "clock jump"  # its own source's time went back
+    CLOCK_JUMP = "clock jump"  # time went back, that of its own source or that of all
 
 
 class Exposures:
@@ -25,14 +27,17 @@ class Exposures:
         Parameters
         ----------
         source
-            The topic that it came from. Two of them may run one period apart, and each alone tells
-            whether the clock was set back.
+            The topic that it came from. Two of them may run one period apart, so that a clock set
+            back by less than `MAX_LAG` is seen by the source's own stamps alone.
         stamp
             Time of the exposure, nanoseconds; 0 for messages without a time, which are always new.
         """
-        if stamp < self._newest.get(source, stamp):
+        if not stamp:
+            return Order.NEW
+        before = self._newest.get(source, 0)
+        others = max((t for name, t in self._newest.items() if name != source), default=0)
+        if stamp < before or stamp < others - MAX_LAG:
             self._newest = {source: stamp}
             return Order.CLOCK_JUMP
-        others = [newest for name, newest in self._newest.items() if name != source]
         self._newest[source] = stamp
-        return Order.SUPERSEDED if stamp and stamp <= max(others, default=-1) else Order.NEW
+        return Order.SUPERSEDED if stamp <= others else Order.NEW

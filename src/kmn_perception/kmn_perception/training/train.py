@@ -119,7 +119,3 @@ def main() -> None:
         sys.exit("interrupted; the same command resumes from the last checkpoint")
     except (ConfigurationError, OSError, RunError) as error:
         sys.exit(f"train: {error}")
-
-
-if __name__ == "__main__":
-    main()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -123,7 +122,3 @@ def main() -> int:
     if options.json:
         write_json(options.json, result)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

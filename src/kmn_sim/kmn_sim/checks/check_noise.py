@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -153,7 +152,3 @@ def main() -> int:
     if options.json:
         write_json(options.json, result)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

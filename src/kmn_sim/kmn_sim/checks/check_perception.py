@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -118,7 +117,3 @@ def main() -> int:
     if options.json:
         write_json(options.json, result)
     return 0 if result["within"] == len(result["scenes"]) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

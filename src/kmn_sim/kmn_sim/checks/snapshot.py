@@ -66,7 +66,3 @@ def main() -> int:
         return 1
     print(f"The picture is {options.out}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

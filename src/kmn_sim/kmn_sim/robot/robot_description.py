@@ -21,7 +21,3 @@ def main() -> int:
         file.read_text(encoding="utf-8").replace('filename="', f'filename="file://{file.parent}/')
     )
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -11,8 +11,6 @@ from kmn_perception.model.camera import Camera
 from kmn_sim.sensors.kinect import Kinect
 from kmn_sim.world.simulation import Simulation
 
-MOUNTS = ("world", "base")
-
 
 class DepthCamera:
     """A depth camera that stands in the world or moves with the robot's base.

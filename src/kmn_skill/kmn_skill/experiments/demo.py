@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +87,3 @@ def main() -> int:
         is_open = run(options, Experiment.load())
     print("the door is open" if is_open else "the door is NOT open")
     return 0 if is_open else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -192,7 +191,3 @@ def main() -> int:
         named = {name: getattr(options, name) for name in ("mode", "parameters", "noise", "seed")}
         write_json(options.json, {**named, **result})
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

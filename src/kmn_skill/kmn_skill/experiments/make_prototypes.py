@@ -6,7 +6,6 @@ Run as ``./run kmn_skill make_prototypes FILE``; it writes ``config/skill/protot
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +94,3 @@ def main() -> int:
         solutions[mode] = best_solution(setup, request, experiment.prototypes, options.tries)
     Prototypes(setup.joint_names, solutions).save(Path(options.file))
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

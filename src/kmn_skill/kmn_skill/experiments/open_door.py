@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import signal
-import sys
 import time
 from collections.abc import Callable
 from types import FrameType
@@ -139,7 +138,3 @@ def main() -> int:
         return 1
     print(f"the door is open by {result.door_angle:.2f} rad")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

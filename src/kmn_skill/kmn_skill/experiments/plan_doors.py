@@ -6,7 +6,6 @@ Run as ``./run kmn_skill plan_doors --mode pull --doors 100``.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -113,7 +112,3 @@ def main() -> int:
         named = {"mode": options.mode, "seed": options.seed}
         write_json(options.json, {**named, **result})
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -108,6 +108,7 @@ class SkillNode(Node):
         if self._worker is not None:
             self._worker.join()
         self._ending.close()
+        self._server.destroy()  # of which the base class does not know
         super().destroy_node()
 
     def now(self) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
-MAX_LAG = 10**9  # ns that a camera's topics may be apart; beyond it time itself went back
+SILENCE = 10 * 10**9  # ns after which a source counts as one that was never heard
+MAX_LAG = 10**9  # ns that such a source may be behind; beyond it time itself went back
 
 
 class Order(Enum):
@@ -27,17 +28,16 @@ class Exposures:
         Parameters
         ----------
         source
-            The topic that it came from. Two of them may run one period apart, so that a clock set
-            back by less than `MAX_LAG` is seen by the source's own stamps alone.
+            The topic that it came from. Two of them may run one period apart, and each alone tells
+            whether the clock was set back; one that was silent, whether it is far behind.
         stamp
             Time of the exposure, nanoseconds; 0 for messages without a time, which are always new.
         """
-        if not stamp:
-            return Order.NEW
-        before = self._newest.get(source, 0)
-        others = max((t for name, t in self._newest.items() if name != source), default=0)
-        if stamp < before or stamp < others - MAX_LAG:
+        before = self._newest.get(source)
+        others = max((t for name, t in self._newest.items() if name != source), default=-1)
+        silent = before is None or before < others - SILENCE
+        if (before is not None and stamp < before) or (silent and stamp < others - MAX_LAG):
             self._newest = {source: stamp}
             return Order.CLOCK_JUMP
         self._newest[source] = stamp
-        return Order.SUPERSEDED if stamp <= others else Order.NEW
+        return Order.SUPERSEDED if stamp and stamp <= others else Order.NEW

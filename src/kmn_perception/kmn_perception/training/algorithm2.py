@@ -14,14 +14,10 @@ from kmn_perception.network.encoding import ParameterEncoding
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.run import Run
 from kmn_perception.training.settings import (
     Algorithm2Settings,
-    TrainingSettings,
-    ValidationSettings,
 )
 from kmn_perception.training.training import Training
-from kmn_perception.training.workers import Workers
 
 
 class Algorithm2(Training):
@@ -29,17 +25,11 @@ class Algorithm2(Training):
 
     settings_type = Algorithm2Settings
 
-    def __init__(
-        self,
-        network: MorphNetwork,
-        settings: TrainingSettings,
-        validation: ValidationSettings,
-        run: Run,
-        workers: Workers,
-    ) -> None:
-        super().__init__(network, settings, validation, run, workers)
+    def prepare(self) -> None:
+        """Keep the network as it begins, and set up its optimiser."""
+        settings = self.settings
         assert isinstance(settings, Algorithm2Settings)
-        self.encoding = ParameterEncoding(network.model, network.model.symmetry)
+        self.encoding = ParameterEncoding(self.model, self.model.symmetry)
         self.baseline = copy.deepcopy(self.network)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
         self.augmented = math.ceil(self.samples * settings.augmentation)  # N_aug

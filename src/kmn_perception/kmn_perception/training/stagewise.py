@@ -16,14 +16,10 @@ from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.stage import Stage
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.run import Run
 from kmn_perception.training.settings import (
     StagewiseSettings,
-    TrainingSettings,
-    ValidationSettings,
 )
 from kmn_perception.training.training import Training
-from kmn_perception.training.workers import Workers
 
 CHUNK = 64  # samples that are generated together
 
@@ -38,15 +34,8 @@ class StagewiseTraining(Training):
 
     network: Cascade
 
-    def __init__(
-        self,
-        network: MorphNetwork,
-        settings: TrainingSettings,
-        validation: ValidationSettings,
-        run: Run,
-        workers: Workers,
-    ) -> None:
-        super().__init__(network, settings, validation, run, workers)
+    def prepare(self) -> None:
+        """Load what all trainings in stages share."""
         self.stagewise = StagewiseSettings.load()
 
     @property

@@ -69,6 +69,11 @@ class Training(ABC):
         self.settings, self.validation, self.run, self.workers = settings, validation, run, workers
         self.state = TrainingState()
         self.samples = math.ceil(settings.samples / workers.count)  # N_data of this process
+        self.prepare()
+
+    @abstractmethod
+    def prepare(self) -> None:
+        """Set up what this procedure needs, before the first round."""
 
     def train(self) -> None:
         """Train to the end, from wherever the last checkpoint left it."""

@@ -117,7 +117,7 @@ def test_files_are_short() -> None:
 
 
 def test_every_answer_of_the_architecture_page_is_a_path() -> None:
-    """Ten questions of a newcomer, each with one path."""
+    """The questions of a newcomer, each with one path."""
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (Where .*?\?) \| `([^`]+)` \|", page, re.M)
     assert len(rows) >= 10

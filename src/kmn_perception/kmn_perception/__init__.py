@@ -4,7 +4,7 @@ The rooms, each of which imports only from those named before it: ``configuratio
 ``command_line``, ``model`` (the analytic models of object, camera and sensor), ``scene`` (from a
 frame to what may be objects), ``network`` (Algorithm 1) and ``refinement`` (the fit), beside each
 other; the two front doors `estimator` (one object) and `pipeline` (a frame); offline ``training``,
-``evaluation``, ``visualization`` and ``experiments``; ``ros`` (the node); and on top of it ``bags``
+``visualization`` and ``evaluation``; ``ros`` (the node); and on top of it ``experiments``, ``bags``
 and ``benchmark``.
 """
 

@@ -1,4 +1,4 @@
-"""The ``benchmark`` executable: how fast the stages of morph_node and its transport are."""
+"""Measure how fast the stages of morph_node and its transport are."""
 
 from __future__ import annotations
 

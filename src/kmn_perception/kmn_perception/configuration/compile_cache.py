@@ -1,7 +1,7 @@
 """Where numba keeps what it has compiled.
 
 By default that is beside the sources, which not every user may write, and what it finds there after
-an upgrade may name classes that are no more, which it cannot read.
+an upgrade may name classes that no longer exist, which it cannot read.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The ``evaluate`` executable: how well morphing parameters are estimated, beside the paper."""
+"""Measure how well morphing parameters are estimated, beside the paper."""
 
 from __future__ import annotations
 

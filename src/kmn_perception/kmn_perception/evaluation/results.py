@@ -1,4 +1,4 @@
-"""The ``results`` executable: the paper's table and plots, with ours, as a page of docs/."""
+"""Write the paper's table and plots, with ours, as a page of docs/."""
 
 from __future__ import annotations
 

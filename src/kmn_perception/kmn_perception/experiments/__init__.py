@@ -1,4 +1,4 @@
 """The experiment on real frames: references from labels, the estimates, and their errors.
 
-Imports the pipeline and ``visualization``; not ``ros``.
+Imports the pipeline, ``evaluation``, ``visualization``, and of ``ros`` the node's parameters.
 """

@@ -1,6 +1,6 @@
 """Programs that communicate by ROS: they end without a traceback, and say why in one line.
 
-The only place that initialises rclpy, and that looks at signals.
+The only place that initialises rclpy.
 """
 
 from __future__ import annotations

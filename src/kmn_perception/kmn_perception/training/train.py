@@ -1,4 +1,4 @@
-"""The ``train`` executable: train the network of a model and write its weight file."""
+"""Train the network of a model and write its weight file."""
 
 from __future__ import annotations
 

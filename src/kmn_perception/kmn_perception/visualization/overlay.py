@@ -1,4 +1,4 @@
-"""Pictures of predicted models over the depth image that they were predicted from."""
+"""Pictures of estimated models over the depth image that they were estimated from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs that measure the simulator and, live through its topics, the perception.
+"""Programs that show or measure the simulator and, live through its topics, the perception.
 
-Imports all other rooms; nothing imports it.
+May import all other rooms; nothing imports it.
 """

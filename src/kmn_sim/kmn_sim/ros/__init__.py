@@ -1,4 +1,4 @@
 """sim_node: the simulated world behind topics, services and parameters.
 
-Imports all other rooms but ``checks``, which stands on top of it.
+May import all other rooms but ``checks``, which stands on top of it.
 """

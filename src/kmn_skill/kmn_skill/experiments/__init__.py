@@ -1,4 +1,4 @@
 """Programs: the demo, random doors in the simulator, plans without one, and the prototypes.
 
-Imports all other rooms; nothing imports it.
+May import all other rooms; nothing imports it.
 """

@@ -143,7 +143,7 @@ class SkillSettings:
     Attributes
     ----------
     robot
-        Whose policy this is, of ``config/robots``.
+        The robot that the policy is for: a name in ``config/robots``.
     solver
         Options of the augmented Lagrangian, by their names.
     """

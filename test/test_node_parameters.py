@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,19 @@ def test_files_without_parameters_for_a_node_are_told(
     told = useless_files("/lab/morph_node", ["--ros-args", "--params-file", str(file)])
     assert bool(told) != useful
     assert all(f"{file} holds no parameters for /lab/morph_node" in line for line in told)
+
+
+@pytest.mark.parametrize("text", ["a: !foo 5.0", "a: 1\n---\nb: 2", "a: =", "a: 2024-13-45"])
+def test_files_that_only_ros_understands_give_no_warning(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(text)
+    assert useless_files("/morph_node", ["--params-file", str(file)]) == []
+
+
+def test_a_pipe_that_ros_has_read_gives_no_warning(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert useless_files("/morph_node", ["--params-file", str(pipe)]) == []
 
 
 def test_values_without_a_node_are_those_of_the_files(tmp_path: Path) -> None:

@@ -112,3 +112,11 @@ def test_depth_of_a_stereo_pair_is_rectified_already() -> None:
     depth = np.linspace(0.5, 2.0, CAMERA.height * CAMERA.width, dtype=np.float32)
     image = image_from_depth(depth.reshape(CAMERA.height, CAMERA.width), "32FC1", Header())
     np.testing.assert_array_equal(view_from_image(image, info, 100.0).points[..., 2].ravel(), depth)
+
+
+@pytest.mark.parametrize(("model", "size"), [("plumb_bob", 5), ("equidistant", 4)])
+@pytest.mark.filterwarnings("error")
+def test_coefficients_beyond_all_bounds_leave_nothing_measured(model: str, size: int) -> None:
+    raw = CAMERA.resized(40, 30)
+    depth = rectify(np.ones((30, 40), np.float32), Distortion(model, (1e30,) * size, raw), raw)
+    assert np.isnan(depth).mean() > 0.9

@@ -110,10 +110,20 @@ def test_an_unknown_name_lists_the_shipped_ones() -> None:
         KinematicModel.load("window")
 
 
-def test_text_that_is_not_yaml_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", [b"theta: [", b"\xff\xfe a: b", b"a: !foo 5"])
+def test_text_that_is_not_yaml_is_refused(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "mine.yaml"
-    file.write_text("theta: [")
+    file.write_bytes(content)
     with pytest.raises(ConfigurationError, match="mine.yaml: not YAML"):
+        KinematicModel.load(file)
+
+
+def test_a_stem_without_a_joint_between_bodies_is_refused(tmp_path: Path) -> None:
+    content = yaml.safe_load(resources.find("config/models", "door").read_text())
+    content["joints"] = {}
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ConfigurationError, match="mine.yaml: stem: a stem needs a joint"):
         KinematicModel.load(file)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -86,7 +87,33 @@ def test_weights_of_another_model_are_refused(file: Path) -> None:
 
 def test_a_foreign_safetensors_file_is_refused(file: Path) -> None:
     save_file({"weight": torch.zeros(3)}, str(file))
-    with pytest.raises(weights.WeightsError, match="not a weight file of ours"):
+    with pytest.raises(weights.WeightsError, match="is no weight file of ours"):
+        weights.load(file, DOOR)
+
+
+def _with_metadata(file: Path, key: str, value: object) -> None:
+    with safe_open(str(file), framework="pt") as opened:
+        metadata = {**opened.metadata(), key: json.dumps(value)}
+        tensors = {name: opened.get_tensor(name) for name in opened.keys()}
+    save_file(tensors, str(file), metadata)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        (
+            "format",
+            "kmn-weights-2",
+            "mine.safetensors is of another version: train it anew",
+        ),
+        ("network", ["cascade"], r"a network of design \['cascade'\] \(known: "),
+    ],
+)
+def test_a_file_of_another_version_or_design_says_so(
+    file: Path, key: str, value: object, text: str
+) -> None:
+    _with_metadata(file, key, value)
+    with pytest.raises(weights.WeightsError, match=text):
         weights.load(file, DOOR)
 
 

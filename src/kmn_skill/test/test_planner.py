@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -152,6 +153,18 @@ def test_after_its_process_was_killed_the_planner_plans(planner: Planner) -> Non
     assert planner.pid is not None
     os.kill(planner.pid, signal.SIGKILL)
     assert planner.plan(request()).report.contact_error <= SETTINGS.check.contact
+
+
+def test_stopped_processes_leave_no_folder_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with Planner(with_limits(attempt_limit=0.1), PROTOTYPES, time_limit=0.15) as planner:
+        with pytest.raises(PlanningFailed):
+            planner.plan(request())
+        assert planner.restarts
+        assert any(tmp_path.iterdir())
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_process_that_dies_while_it_plans_is_replaced(planner: Planner) -> None:

@@ -36,7 +36,7 @@ class Section:
         """Read a YAML file."""
         try:
             return cls(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
-        except yaml.YAMLError as error:
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
             raise ConfigurationError(f"{path.name}: not YAML: {error}") from error
 
     def allow(self, required: Collection[str], optional: Collection[str] = ()) -> None:

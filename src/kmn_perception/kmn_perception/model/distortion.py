@@ -100,6 +100,6 @@ def _raw_pixels(
     is_fisheye = model == "equidistant"
     rectify_map = (cv2.fisheye if is_fisheye else cv2).initUndistortRectifyMap
     u, v = rectify_map(before, np.array(coefficients), np.eye(3), after, target[4:], cv2.CV_32FC1)
-    columns, rows = np.rint(u).astype(np.intp), np.rint(v).astype(np.intp)
-    inside = (columns >= 0) & (columns < raw[4]) & (rows >= 0) & (rows < raw[5])
-    return np.where(inside, rows, 0), np.where(inside, columns, 0), inside
+    inside = (u >= -0.5) & (u < raw[4] - 0.5) & (v >= -0.5) & (v < raw[5] - 0.5)  # not NaN
+    rows, columns = (np.rint(np.where(inside, place, 0.0)).astype(np.intp) for place in (v, u))
+    return rows, columns, inside

@@ -101,8 +101,10 @@ def read_stem(section: Section, bodies: Sequence[Body], joints: Sequence[Joint])
         return None
     stem = section.section("stem")
     stem.allow(("joint", "thickness"))
-    name = stem.text("joint", [joint.name for joint in joints if joint.parent != "world"])
-    joint = next(joint for joint in joints if joint.name == name)
+    between = {joint.name: joint for joint in joints if joint.parent != "world"}
+    if not between:
+        raise stem.error("a stem needs a joint between two bodies, and there is none")
+    joint = between[stem.text("joint", between)]
     by_name = {body.name: body for body in bodies}
     thickness = stem.number("thickness", 0.0)
     return Stem(joint, by_name[joint.body], by_name[joint.parent], thickness)

@@ -127,9 +127,11 @@ def describe(model: KinematicModel) -> dict[str, Any]:
 
 
 def _check(name: str, metadata: Mapping[str, Any], model: KinematicModel) -> None:
-    if metadata.get("format") != FORMAT:
-        found = metadata.get("format")
-        raise WeightsError(f"{name} is not a weight file of ours: format {found}, not {FORMAT}")
+    found = metadata.get("format")
+    if found != FORMAT:
+        is_ours = str(found).startswith(FORMAT.rstrip("0123456789"))
+        what = "of another version: train it anew" if is_ours else "no weight file of ours"
+        raise WeightsError(f"{name} is {what} (format {found}, not {FORMAT})")
     for key, expected in describe(model).items():
         if metadata.get(key) != expected:
             raise WeightsError(
@@ -141,7 +143,7 @@ def _check(name: str, metadata: Mapping[str, Any], model: KinematicModel) -> Non
 def _build(name: str, model: KinematicModel, metadata: Mapping[str, Any]) -> MorphNetwork:
     """Return the untrained network that a file describes."""
     design = metadata.get("network")
-    if design not in DESIGNS:
+    if not isinstance(design, str) or design not in DESIGNS:
         known = ", ".join(DESIGNS)
         raise WeightsError(f"{name} holds a network of design {design!r} (known: {known})")
     try:

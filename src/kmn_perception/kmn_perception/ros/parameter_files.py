@@ -20,12 +20,16 @@ def useless_files(name: str, arguments: Sequence[str]) -> list[str]:
     Parameters
     ----------
     arguments
-        Those of ROS, whose files ROS has read before.
+        Those of ROS, which has read the files before. One that cannot be read again, as a pipe, or
+        that only ROS understands, gives no warning.
     """
     texts = []
     for argument, file in zip(arguments, arguments[1:], strict=False):
-        if argument == FILE_ARGUMENT:
-            tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        if argument == FILE_ARGUMENT and Path(file).is_file():
+            try:
+                tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+            except (OSError, ValueError, yaml.YAMLError):
+                continue
             names = list(_names(tree or {}))
             if not any(_matches(pattern, name) for pattern in names):
                 held = ", ".join(names) or "no node"

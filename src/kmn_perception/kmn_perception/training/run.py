@@ -36,7 +36,8 @@ class Run:
         text = json.dumps(settings, indent=2)
         file = folder / "settings.json"
         if not file.exists():
-            file.write_text(text, encoding="utf-8")
+            with replacing(file) as new:
+                new.write_text(text, encoding="utf-8")
         elif file.read_text(encoding="utf-8") != text:
             raise RunError(
                 f"{folder} holds a run with other settings (see {file}); "

@@ -85,7 +85,9 @@ class SceneClient:
         self._client.set_parameters(self._setting, scene, self._timeout)
         self._truths.clear()
         self._estimates.clear()
-        estimate, received = self._client.wait(self._answered, self._timeout, "morph_node")
+        estimate, received = self._client.wait(
+            lambda: self._answered(values), self._timeout, "morph_node"
+        )
         truth = next(t for t in self._truths if t.header.stamp == estimate.header.stamp)
         return SceneEstimate(
             np.array([*truth.theta, *truth.gamma]),
@@ -98,9 +100,9 @@ class SceneClient:
     def _keep(self, estimate: MorphingParameters) -> None:
         self._estimates.append((estimate, time.time()))
 
-    def _answered(self) -> tuple[MorphingParameters, float] | None:
-        """Return an estimate of an exposure of the present scene."""
-        stamps = [truth.header.stamp for truth in self._truths]
+    def _answered(self, values: NDArray[np.float64]) -> tuple[MorphingParameters, float] | None:
+        """Return an estimate of an exposure of the scene; one of the scene before may come late."""
+        stamps = [t.header.stamp for t in self._truths if np.allclose([*t.theta, *t.gamma], values)]
         return next((pair for pair in self._estimates if pair[0].header.stamp in stamps), None)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -50,6 +51,7 @@ class Planner:
         self._settings = setup.settings.planner
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None  # where the process works
         self._loaded = False
         self.restarts = 0
 
@@ -157,8 +159,9 @@ class Planner:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._connection, other = context.Pipe()
+        self._folder = tempfile.TemporaryDirectory()
         self._process = context.Process(
-            target=serve, args=(other, self._setup), name="planner", daemon=True
+            target=serve, args=(other, self._setup, self._folder.name), name="planner", daemon=True
         )
         self._process.start()
         self._loaded = False
@@ -170,9 +173,10 @@ class Planner:
         self.restarts += 1
 
     def _stop(self) -> None:
-        if self._process is None or self._connection is None:
+        if self._process is None or self._connection is None or self._folder is None:
             return
         self._connection.close()
         self._process.kill()
         self._process.join(STOP_TIMEOUT)
-        self._process = self._connection = None
+        self._folder.cleanup()
+        self._process = self._connection = self._folder = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import tempfile
 from multiprocessing.connection import Connection
 
 from kmn_skill.planning.planning_setup import PlanningSetup
@@ -12,13 +11,12 @@ from kmn_skill.planning.planning_setup import PlanningSetup
 READY = "ready"  # is sent when all is loaded
 
 
-def serve(connection: Connection, setup: PlanningSetup) -> None:
+def serve(connection: Connection, setup: PlanningSetup, folder: str) -> None:
     """Say when ready, then answer each (request, guess) with a plan, or why there is none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)  # the package robotic writes a log where it is
-        _silence()
-        _answer(connection, setup)
+    os.chdir(folder)  # the package robotic writes a log where it is
+    _silence()
+    _answer(connection, setup)
 
 
 def _answer(connection: Connection, setup: PlanningSetup) -> None:

@@ -63,13 +63,16 @@ def markers_from_estimates(
 ) -> MarkerArray:
     """Draw the bodies of the estimated models as cubes, which replace the former ones.
 
-    They are green where the estimate is valid, else red; without an object there are none.
+    They are green where the estimate is valid, else red; without an object there are none, and
+    none of a body without a size.
     """
     markers = [Marker(header=header, ns=model.name, action=Marker.DELETEALL)]
     for estimate in estimates:
         if np.isfinite(estimate.theta).all() and np.isfinite(estimate.gamma).all():
             colour = INVALID_COLOUR if estimate.reason else VALID_COLOUR
             for cube in model.unit_cubes(estimate.theta, estimate.gamma):
+                if not cube[:3, :3].any(axis=0).all():
+                    continue
                 markers.append(cube_marker(model.name, len(markers) - 1, cube, colour, header))
     return MarkerArray(markers=markers)
 

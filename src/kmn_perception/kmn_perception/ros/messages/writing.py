@@ -74,5 +74,5 @@ def info_from_camera(camera: Camera, header: Header) -> CameraInfo:
 def _bytes(values: NDArray[np.generic]) -> array.array[int]:
     """Pack an array as rclpy takes it without a check of every single byte."""
     packed = array.array("B")
-    packed.frombytes(np.ascontiguousarray(values).data.cast("B"))
+    packed.frombytes(np.ascontiguousarray(values).reshape(-1).view(np.uint8).data)
     return packed

@@ -155,10 +155,11 @@ def test_the_world_changes_by_parameters_while_a_trajectory_runs(client: SimClie
     client.trajectory.publish(trajectory((20.0, 0.0, -1.0)))
     values = [0.1, 0.2, 0.3, 0.1, 0.0, 0.01, 0.02]
     assert client.set(placement="given", values=values, direction="push").successful
-    client.truths.clear()
-    truth = client.graph.wait_for(lambda: client.truths)[-1]
-    assert [*truth.theta, *truth.gamma] == pytest.approx(values)
-    assert client.position(ARM[0]) == pytest.approx(1.0, abs=0.01)  # back where it starts
+    client.graph.wait_for(
+        lambda: [*client.truths[-1].theta, *client.truths[-1].gamma] == pytest.approx(values)
+    )
+    # Back where it starts.
+    client.graph.wait_for(lambda: client.position(ARM[0]) == pytest.approx(1.0, abs=0.01))
     assert client.set(placement="random", direction="pull").successful
 
 
@@ -185,12 +186,14 @@ def test_a_wrong_parameter_is_refused_with_the_reason(
 
 def test_boxes_have_no_door_state(client: SimClient) -> None:
     assert client.set(model="box_c", table=True).successful
-    client.truths.clear()
-    assert client.graph.wait_for(lambda: client.truths)[-1].model == "box_c"
-    time.sleep(0.2)
-    client.doors.clear()
-    time.sleep(0.5)
-    assert client.doors == []
+    client.graph.wait_for(lambda: client.truths[-1].model == "box_c")
+
+    def no_door_is_told() -> bool:
+        client.doors.clear()
+        time.sleep(0.5)
+        return not client.doors
+
+    client.graph.wait_for(no_door_is_told)  # what was on its way has come
     assert client.set(model="door", table=False).successful
 
 

@@ -30,20 +30,25 @@ def client(graph: Any) -> SimClient:
     return made
 
 
-def begin(client: SimClient, file: Path) -> None:
-    """Begin a recording, and wait until some pictures are taken."""
+def begin(client: SimClient, file: Path) -> int:
+    """Begin a recording, wait for some pictures, and return how many were lost before."""
+    lost = recordings_lost(client)
     assert client.set(record=str(file)).successful
     client.wait_until(client.now() + 2.0)
+    return lost
 
 
-def assert_lost(client: SimClient, file: Path, reason: str) -> None:
+def recordings_lost(client: SimClient) -> int:
+    return int(client.report()["recordings_lost"])
+
+
+def assert_lost(client: SimClient, file: Path, reason: str, before: int) -> None:
     """End a recording that is lost, and assert that this is told and the simulation goes on."""
-    lost = int(client.report()["recordings_lost"])
     assert client.set(record="").successful
     client.graph.wait_for(
         lambda: [text for text in client.log if f"'{file}' is lost: {reason}" in text]
     )
-    assert int(client.report()["recordings_lost"]) == lost + 1
+    assert recordings_lost(client) == before + 1
     client.wait_until(client.now() + 0.5)
 
 
@@ -99,9 +104,9 @@ def test_a_removed_folder_does_not_end_the_simulation(
 ) -> None:
     file = tmp_path / "folder" / f"lost.{ending}"
     file.parent.mkdir()
-    begin(client, file)
+    before = begin(client, file)
     shutil.rmtree(file.parent)
-    assert_lost(client, file, "No such file or directory")
+    assert_lost(client, file, "No such file or directory", before)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -109,7 +114,7 @@ def test_a_folder_of_its_name_does_not_end_the_simulation(
     client: SimClient, tmp_path: Path, ending: str
 ) -> None:
     file = tmp_path / f"lost.{ending}"
-    begin(client, file)
+    before = begin(client, file)
     file.mkdir()
-    assert_lost(client, file, "Is a directory")
+    assert_lost(client, file, "Is a directory", before)
     assert list(tmp_path.iterdir()) == [file]

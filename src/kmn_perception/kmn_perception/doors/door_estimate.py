@@ -1,0 +1,93 @@
+"""What was found out about a door in its wall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.geometry import DOOR
+
+
+class DoorStatus(Enum):
+    """What an estimate of a door is worth."""
+
+    OK = "ok"
+    HANDLE_NOT_SEEN = "handle not seen"  # the rest holds; where to look is the handle's place
+    NO_DOOR = "no door"
+    AMBIGUOUS = "ambiguous"
+
+
+@dataclass(frozen=True, eq=False)
+class DoorEstimate:
+    """A door in its wall.
+
+    Attributes
+    ----------
+    status, reason
+        What it is worth, and why it is not OK.
+    values, covariance
+        (9,) and (9, 9) parameters of the door, see `DOOR`; NaN where there is none.
+    handle_side, handle_kind
+        ``left`` or ``right`` as seen; ``lever`` or ``knob``; empty where it is not seen.
+    camera_pose
+        (4, 4) optical frame in the world, whose origin is on the floor below the camera.
+    corners
+        (4, 3) of the panel's front: top left, top right, bottom left, bottom right; optical frame.
+    handle
+        (3,) its middle, optical frame.
+    normal
+        (3,) of the panel, towards the camera, optical frame.
+    disparity_offset
+        Value and standard deviation of the sensor's error as this frame shows it, 1/m.
+    score
+        How much speaks for it.
+    """
+
+    status: DoorStatus
+    reason: str
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    handle_side: str
+    handle_kind: str
+    camera_pose: NDArray[np.float64]
+    corners: NDArray[np.float64]
+    handle: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    disparity_offset: tuple[float, float]
+    score: float
+
+    @classmethod
+    def none(cls, reason: str, status: DoorStatus = DoorStatus.NO_DOOR) -> DoorEstimate:
+        """Return the estimate that says why there is none."""
+        n = len(DOOR)
+        return cls(
+            status=status,
+            reason=reason,
+            values=np.full(n, np.nan),
+            covariance=np.full((n, n), np.nan),
+            handle_side="",
+            handle_kind="",
+            camera_pose=np.full((4, 4), np.nan),
+            corners=np.full((4, 3), np.nan),
+            handle=np.full(3, np.nan),
+            normal=np.full(3, np.nan),
+            disparity_offset=(np.nan, np.nan),
+            score=-np.inf,
+        )
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a door, with or without its handle in sight."""
+        return self.status in (DoorStatus.OK, DoorStatus.HANDLE_NOT_SEEN)
+
+    def value(self, name: str) -> float:
+        """Return a parameter by its name, see `DOOR`."""
+        return float(self.values[DOOR.index(name)])
+
+    def deviation(self, name: str) -> float:
+        """Return its standard deviation."""
+        i = DOOR.index(name)
+        return float(np.sqrt(self.covariance[i, i]))

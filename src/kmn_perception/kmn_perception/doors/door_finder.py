@@ -1,0 +1,146 @@
+"""From a frame to the door in it: planes, the vertical, walls, edges, handle, one fit, a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.candidates import Candidate, find_candidates
+from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.lines import cut_to_pieces, find_lines
+from kmn_perception.doors.measuring import measure
+from kmn_perception.doors.planes import Plane, find_planes
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
+from kmn_perception.doors.verdict import judge
+from kmn_perception.doors.wall_view import WallFrame, view_wall
+from kmn_perception.model.camera import Camera
+
+_MAX_WALLS = 3
+
+
+class Frame(NamedTuple):
+    """What was measured in one exposure.
+
+    Attributes
+    ----------
+    depth
+        (height, width) metres, 0 for none.
+    grey
+        (height, width) 0 to 1, of the same pixels; None without an image.
+    camera
+        Their pinhole camera; its pose is not used.
+    """
+
+    depth: NDArray[np.float32]
+    grey: NDArray[np.float32] | None
+    camera: Camera
+
+
+class DoorFinder:
+    """Finds the door of a wall in depth and, where there is one, grey image.
+
+    Attributes
+    ----------
+    settings
+        May be replaced between two frames.
+    """
+
+    def __init__(self, settings: DoorSettings, seed: int = 0) -> None:
+        self.settings, self.seed = settings, seed
+
+    def find(self, frame: Frame) -> DoorEstimate:
+        """Find the door that the frame shows best, or say why there is none."""
+        settings = self.settings
+        noise = settings.fit.pixel_noise
+        generator = np.random.default_rng(self.seed)
+        blocks = Blocks.of(frame.depth, frame.camera, noise, settings.planes)
+        planes = find_planes(blocks, noise, settings.planes, generator)
+        if not planes:
+            return DoorEstimate.none("no plane is seen")
+        segments = None
+        if frame.grey is not None:
+            segments = line_segments(frame.grey, frame.camera, settings.vertical)
+        up = find_up(planes, segments, settings.vertical)
+        floor = self._camera_height(blocks, up)
+        height = settings.prior.handle_height[0] if floor is None else floor
+        walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
+        if not walls:
+            return DoorEstimate.none("no wall is seen")
+        candidates = [
+            candidate
+            for wall in walls[:_MAX_WALLS]
+            for candidate in self._candidates(frame, wall, up, height)
+        ]
+        if not candidates:
+            return DoorEstimate.none(_no_edges(frame))
+        candidates.sort(key=lambda candidate: -candidate.score)
+        found = [
+            judge(measurement, settings)
+            for candidate in candidates[: settings.candidates]
+            if (measurement := measure(frame, blocks, candidate, floor is not None, settings))
+        ]
+        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
+
+    def _camera_height(self, blocks: Blocks, up: NDArray[np.float64]) -> float | None:
+        settings = self.settings.floor
+        rays, inverse, valid = blocks.flat()
+        return find_camera_height(
+            rays[valid] @ up,
+            inverse[valid],
+            self.settings.fit.pixel_noise,
+            settings.heights,
+            settings.min_blocks,
+            settings.max_deviation,
+        )
+
+    def _candidates(
+        self, frame: Frame, wall: Plane, up: NDArray[np.float64], height: float
+    ) -> list[Candidate]:
+        """Return the pairs of upright edges of a wall."""
+        settings, noise = self.settings, self.settings.fit.pixel_noise
+        at = WallFrame.of(wall.vector, up, height)
+        view = view_wall(at, frame.depth, frame.grey, frame.camera, settings.view)
+        if view is None:
+            return []
+        before, behind = settings.view.before * noise, settings.view.behind * noise
+        pieces = cut_to_pieces(view, before, behind, settings.lines)
+        return find_candidates(view, pieces, find_lines(pieces, settings.lines), settings)
+
+    def _best(self, found: list[DoorEstimate]) -> DoorEstimate:
+        """Return the door that most speaks for, unless another one is as likely."""
+        doors = [door for door in found if door.found]
+        if not doors:
+            return max(found, key=lambda door: door.score)
+        best = max(doors, key=lambda door: (door.status is DoorStatus.OK, door.score))
+        for other in doors:
+            near = other.score > best.score - self.settings.verdict.rival
+            if other is not best and near and other.status is best.status and _overlap(best, other):
+                return replace(
+                    best,
+                    status=DoorStatus.AMBIGUOUS,
+                    reason="another pair of edges may as well be the door's: "
+                    f"{other.value('door_width') + 0.8:.2f} m apart, "
+                    f"not {best.value('door_width') + 0.8:.2f} m",
+                )
+        return best
+
+
+def _overlap(a: DoorEstimate, b: DoorEstimate) -> bool:
+    """Return whether two doors that differ share some of their place."""
+    along = a.corners[3] - a.corners[2]
+    width = float(np.linalg.norm(along))
+    ends = [(corner - a.corners[2]) @ along / width for corner in b.corners[2:]]
+    differ = max(abs(ends[0]), abs(ends[1] - width))
+    sigma = 3.0 * (a.deviation("door_width") + b.deviation("door_width"))
+    return differ > sigma and ends[0] < width and ends[1] > 0.0
+
+
+def _no_edges(frame: Frame) -> str:
+    if frame.grey is None:
+        return "no step in depth as of a recessed door; a flush one is seen with an image only"
+    return "no upright edges as far apart as a door's"

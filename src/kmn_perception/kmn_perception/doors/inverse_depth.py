@@ -1,0 +1,85 @@
+"""Inverse depths on a grid of blocks: planes are linear in them, and their noise is even.
+
+Along a ray r = (x, y, 1) of the optical frame a plane n . p = d has 1 / z = r . (n / d). A stereo
+camera measures disparity, which is proportional to 1 / z, so that its noise does not grow with z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from kmn_perception.doors.settings import PlaneSettings
+from kmn_perception.model.camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Medians of inverse depths over blocks of pixels.
+
+    Attributes
+    ----------
+    rays
+        (H, W, 3) of depth 1 through the blocks' middles, in the optical frame.
+    inverse
+        (H, W) inverse depths, 1/m; 0 where nothing is known.
+    valid
+        (H, W) blocks that were measured, and show one surface.
+    size
+        Of a block, pixels.
+    """
+
+    rays: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    size: int
+
+    @classmethod
+    def of(
+        cls, depth: NDArray[np.float32], camera: Camera, noise: float, settings: PlaneSettings
+    ) -> Blocks:
+        """Take the blocks of a depth image (height, width), metres, NaN where there is none.
+
+        Parameters
+        ----------
+        noise
+            Standard deviation of a block's inverse depth, 1/m.
+        """
+        size = settings.block
+        least = max(1, int(np.ceil(settings.min_measured * size * size)))
+        inverse, spread = _medians(depth, size, least)
+        u = np.arange(inverse.shape[1]) * size + (size - 1) / 2.0
+        v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
+        rays = camera.rays(*np.meshgrid(u, v))
+        return cls(rays, inverse, (inverse > 0.0) & (spread < settings.max_spread * noise), size)
+
+    def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Return rays (N, 3), inverse depths and validity (N,), row by row."""
+        return self.rays.reshape(-1, 3), self.inverse.reshape(-1), self.valid.reshape(-1)
+
+
+@njit(cache=True)
+def _medians(
+    depth: NDArray[np.float32], size: int, least: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return median and spread (from the 10th to the 90th percentile) of 1 / z of each block."""
+    rows, columns = depth.shape[0] // size, depth.shape[1] // size
+    inverse, spread = np.zeros((rows, columns)), np.zeros((rows, columns))
+    values = np.empty(size * size)
+    for i in range(rows):
+        for j in range(columns):
+            count = 0
+            for v in range(i * size, (i + 1) * size):
+                for u in range(j * size, (j + 1) * size):
+                    z = depth[v, u]
+                    if z > 0.0:  # neither none nor NaN
+                        values[count] = 1.0 / z
+                        count += 1
+            if count >= least:
+                part = np.sort(values[:count])
+                inverse[i, j] = part[count // 2]
+                spread[i, j] = part[(9 * count) // 10] - part[count // 10]
+    return inverse, spread

@@ -1,0 +1,70 @@
+"""The top of a door: a level edge between its upright ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from kmn_perception.doors.settings import LintelSettings
+from kmn_perception.doors.wall_view import WallView
+
+_PIECE = 0.1  # metres
+
+
+class Lintel(NamedTuple):
+    """What is known of the top.
+
+    Attributes
+    ----------
+    z
+        Height of the edge above the floor, metres; None where no edge was found.
+    seen_to
+        Height up to which the door is in view, metres.
+    """
+
+    z: float | None
+    seen_to: float
+
+
+def find_lintel(view: WallView, left: int, right: int, settings: LintelSettings) -> Lintel:
+    """Find the level edge above a door between two columns of its wall's view."""
+    inner = slice(left + 6, max(right - 6, left + 7))
+    inside = view.inside[:, inner]
+    enough = np.flatnonzero(inside.mean(axis=1) > 0.5)
+    seen_to = float(view.z[enough[0]]) if len(enough) else 0.0
+    low, high = settings.heights
+    if view.grey is None or seen_to < low:
+        return Lintel(None, seen_to)
+    x = np.arange(-6, 7)
+    weights = x * np.exp(-0.5 * (x / 2.0) ** 2)
+    weights *= 2.0 * np.sqrt(2.0 * np.pi) / (weights * x).sum()
+    steps = cv2.filter2D(
+        np.where(inside, view.grey[:, inner], 0.0).astype(np.float32),
+        -1,
+        weights[:, None].astype(np.float32),
+        borderType=cv2.BORDER_REPLICATE,
+    )
+    known = cv2.erode(inside.astype(np.uint8), np.ones((13, 1), np.uint8)) > 0
+    size = max(1, round(_PIECE / abs(float(view.s[1] - view.s[0]))))
+    count = steps.shape[1] // size
+    if count < 3:
+        return Lintel(None, seen_to)
+    shape = (len(view.z), count, size)
+    number = known[:, : count * size].reshape(shape).sum(axis=2)
+    pieces = (steps * known)[:, : count * size].reshape(shape).sum(axis=2) / np.maximum(number, 1)
+    told = number > 0.5 * size
+    best: tuple[float, float] | None = None
+    for sign in (1.0, -1.0):
+        near = cv2.dilate((sign * pieces).astype(np.float32), np.ones((5, 1), np.uint8))
+        visible = np.maximum(told.sum(axis=1), 1)
+        coverage = ((near > settings.min_contrast) & told).sum(axis=1) / visible
+        contrast = (np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0)).sum(axis=1) / visible
+        rows = (view.z > low) & (view.z < high) & (coverage >= settings.min_coverage)
+        rows &= told.sum(axis=1) >= 0.5 * count
+        if rows.any():
+            row = int(np.where(rows, contrast, -1.0).argmax())
+            if best is None or contrast[row] > best[0]:
+                best = float(contrast[row]), float(view.z[row])
+    return Lintel(None if best is None else best[1], seen_to)

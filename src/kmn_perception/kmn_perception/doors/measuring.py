@@ -1,0 +1,212 @@
+"""One candidate measured: its surfaces, edges, top and handle, and the door that follows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.candidates import Candidate
+from kmn_perception.doors.geometry import (
+    DoorShape,
+    View2d,
+    door_shape,
+    door_values,
+    propagate,
+)
+from kmn_perception.doors.handle import Handle, find_handle
+from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.lines import Line, Pieces
+from kmn_perception.doors.lintel import Lintel, find_lintel
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
+from kmn_perception.doors.wall_view import WallFrame, WallView
+
+if TYPE_CHECKING:
+    from kmn_perception.doors.door_finder import Frame
+
+_VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
+_HIDDEN_REVEAL = (0.0, 0.1)
+_PROUD = (0.8, 0.2)
+
+
+class Measurement(NamedTuple):
+    """A candidate with all that was measured of it.
+
+    Attributes
+    ----------
+    shape, values, covariance
+        The door, see `door_shape` and `DOOR`.
+    inverse_height
+        Of the camera above the floor, 1/m.
+    handle
+        None where it is not seen.
+    floor_seen
+        Whether the floor tells the camera's height.
+    """
+
+    candidate: Candidate
+    surfaces: Surfaces
+    lintel: Lintel
+    handle: Handle | None
+    shape: DoorShape
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    inverse_height: float
+    floor_seen: bool
+
+
+def measure(
+    frame: Frame, blocks: Blocks, candidate: Candidate, floor: bool, settings: DoorSettings
+) -> Measurement | None:
+    """Measure a candidate; None where wall or panel are hardly seen."""
+    at = candidate.view.frame
+    edges = [_edge(candidate, line, settings) for line in (candidate.left, candidate.right)]
+    directions = edges[0][0], edges[1][0]
+    surfaces = fit_surfaces(
+        blocks, at, directions, floor, settings.disparity_offset, settings.fit
+    )
+    if surfaces is None:
+        return None
+    lintel = find_lintel(candidate.view, candidate.left.column, candidate.right.column, settings.lintel)
+    panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
+    on_panel = tuple(_along(at, panel, surfaces, direction) for direction in directions)
+    handle = find_handle(
+        panel, (on_panel[0], on_panel[1]), frame.depth, frame.grey, frame.camera,
+        settings.handle, settings.lines.step_noise,
+    )  # fmt: skip
+    measured, covariance = _gather(at, panel, surfaces, edges, lintel, handle, floor, settings)
+    look = View2d(at.right[2], -at.normal[2])
+    handle_left = handle is not None and handle.side == "left"
+    ajar = surfaces.opening != 0.0
+    values, spread = propagate(
+        lambda m: door_values(m, handle_left, ajar, look), measured, covariance
+    )
+    shape = door_shape(measured, handle_left, ajar)
+    return Measurement(
+        candidate, surfaces, lintel, handle, shape, values, spread, float(measured[4]), floor
+    )
+
+
+def _vector(frame: WallFrame, line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the plane's vector of a line seen from above."""
+    vector: NDArray[np.float64] = line[0] * frame.right - line[1] * frame.normal
+    return vector
+
+
+def _along(at: WallFrame, panel: WallFrame, surfaces: Surfaces, direction: float) -> float:
+    """Return where a direction meets the panel, metres to the right along it."""
+    ray = np.array([direction, 1.0])
+    point = ray / (surfaces.values[PANEL] @ ray)
+    return float(point[0] * (at.right @ panel.right) - point[1] * (at.normal @ panel.right))
+
+
+def _edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tuple[float, float]:
+    """Return the direction of an edge and its standard deviation, from its pieces."""
+    view, pieces = candidate.view, candidate.pieces
+    distance = view.frame.distance
+    noise = settings.fit.edge_noise * float(view.footprint[line.column]) / distance
+    if line.contrast == 0.0:
+        return float(view.s[line.column]) / distance, 3.0 * noise + 0.012 / distance
+    position, spread = _subpixel(view, pieces, line, settings)
+    return position / distance, float(np.hypot(noise, spread / distance))
+
+
+def _subpixel(
+    view: WallView, pieces: Pieces, line: Line, settings: DoorSettings
+) -> tuple[float, float]:
+    """Return the place of an edge and the standard deviation of its mean, metres."""
+    reach = 5
+    first = max(line.column - reach, 0)
+    columns = slice(first, line.column + reach + 1)
+    places = []
+    for k in np.flatnonzero(pieces.body):
+        if not pieces.known[k, columns].mean() > 0.7:
+            continue
+        profile = line.sign * pieces.gradient[k, columns]
+        if profile.max() < 0.6 * settings.lines.min_contrast:
+            continue
+        weights = np.maximum(profile - 0.5 * profile.max(), 0.0)
+        places.append(first + float((weights * np.arange(len(weights))).sum() / weights.sum()))
+    pixel = float(view.s[1] - view.s[0])
+    if len(places) < 3:
+        return float(view.s[line.column]), 2.0 * pixel
+    found = np.array(places)
+    middle = np.median(found)
+    scatter = max(1.48 * float(np.median(np.abs(found - middle))), 0.6)
+    near = found[np.abs(found - middle) < 3.0 * scatter]
+    spread = float(near.std()) / np.sqrt(max(len(near) / 3.0, 1.0))
+    return float(view.s[0] + near.mean() * pixel), spread * pixel
+
+
+def _gather(
+    at: WallFrame,
+    panel: WallFrame,
+    surfaces: Surfaces,
+    edges: list[tuple[float, float]],
+    lintel: Lintel,
+    handle: Handle | None,
+    floor: bool,
+    settings: DoorSettings,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what was measured (13,) and its covariance, see `MEASURED`."""
+    wall_line, panel_line = surfaces.values[WALL], surfaces.values[PANEL]
+    values, deviations = np.zeros(13), np.zeros(13)
+    values[:5] = surfaces.values[:5]
+    recess = []
+    for i, (direction, deviation) in enumerate(edges):
+        values[5 + i], deviations[5 + i] = direction, deviation
+        ray = np.array([direction, 1.0])
+        point = ray / (panel_line @ ray)
+        depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
+        recess.append(depth)
+        outward = direction < 0.0 if i == 0 else direction > 0.0
+        if depth < 0.0:
+            told = _PROUD
+        else:
+            told = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        values[7 + i], deviations[7 + i] = told
+    values[9], deviations[9] = _top(lintel, settings)
+    middle = 0.5 * (edges[0][0] + edges[1][0])
+    expected = settings.prior.handle_height
+    height = 1.0 / surfaces.values[FLOOR]
+    covariance = np.zeros((13, 13))
+    covariance[:5, :5] = surfaces.covariance[:5, :5]
+    if handle is None:
+        # Where to look: at the usual place of the right edge.
+        ray = np.array([edges[1][0], 1.0])
+        far = 1.0 / (panel_line @ ray)
+        inset = settings.prior.handle_inset
+        values[10] = edges[1][0] - inset[0] / far
+        deviations[10] = (middle - edges[0][0]) * 2.0
+        values[11], deviations[11] = (expected[0] - height) / far, 3.0 * expected[1] / far
+    else:
+        point = panel.points(np.array(handle.s), np.array(handle.z))
+        away = float(-point @ at.normal)
+        values[10] = float(point @ at.right) / away
+        values[11] = float(point @ at.up) / away
+        deviations[10] = handle.along_noise / away
+        deviations[11] = settings.handle.up_noise / away
+    values[12], deviations[12] = settings.handle.protrusion
+    covariance += np.diag(deviations**2)
+    if not floor:
+        # The handle's usual height tells the floor's, and no more than that.
+        ray = np.array([values[10], 1.0])
+        away = 1.0 / (panel_line @ ray)
+        height = expected[0] - values[11] * away if handle is not None else height
+        values[4] = 1.0 / height
+        covariance[4, :] = covariance[:, 4] = 0.0
+        covariance[4, 4] = (expected[1] / height**2) ** 2
+    return values, covariance
+
+
+def _top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:
+    """Return height of the top and its standard deviation, by the usual heights if it is not seen."""
+    if lintel.z is not None:
+        return lintel.z, settings.lintel.noise
+    mean, deviation = settings.prior.height
+    grid = np.linspace(min(lintel.seen_to, mean + 2.0 * deviation), mean + 3.0 * deviation, 200)
+    weights = np.exp(-0.5 * ((grid - mean) / deviation) ** 2)
+    value = float(np.average(grid, weights=weights))
+    return value, float(np.sqrt(np.average((grid - value) ** 2, weights=weights)))

@@ -1,0 +1,323 @@
+"""Settings of the search for doors in walls, read from ``config/doors.yaml``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.settings import (
+    Count,
+    Fraction,
+    Interval,
+    NonNegative,
+    Positive,
+    load_settings,
+)
+
+
+@dataclass(frozen=True)
+class PlaneSettings:
+    """How planes are found in blocks of pixels.
+
+    Attributes
+    ----------
+    block
+        Side of a block, pixels.
+    min_measured, max_spread
+        Share of a block that must be measured, and its largest spread in pixel noises.
+    trials, patch
+        Hypotheses for each plane, from three blocks within so many pixels of each other.
+    inlier
+        Distance to a plane within which a block lies on it, in pixel noises.
+    min_share, max_planes
+        Share of all blocks that makes a plane, and how many planes are sought.
+    """
+
+    block: Count
+    min_measured: Fraction
+    max_spread: Positive
+    trials: Count
+    patch: Interval
+    inlier: Positive
+    min_share: Fraction
+    max_planes: Count
+
+
+@dataclass(frozen=True)
+class VerticalSettings:
+    """How the vertical is found.
+
+    Attributes
+    ----------
+    max_floor_tilt, max_wall_tilt
+        Angles to the image's upward direction that a floor's, and to the horizontal that a wall's
+        normal may have, radians.
+    floor_deviation, wall_deviation, image_deviation
+        Standard deviations of what a floor, a wall and the image's upward direction tell, radians.
+    min_segment, segment_noise
+        Shortest line segment, and standard deviation of its ends, pixels.
+    search, accept
+        Angles about the first guess, and about the result, within which segments are vertical,
+        radians.
+    """
+
+    max_floor_tilt: Positive
+    max_wall_tilt: Positive
+    floor_deviation: Positive
+    wall_deviation: Positive
+    image_deviation: Positive
+    min_segment: Positive
+    segment_noise: Positive
+    search: Positive
+    accept: Positive
+
+
+@dataclass(frozen=True)
+class FloorSettings:
+    """Heights of the camera above the floor that are sought, metres, and blocks that tell it."""
+
+    heights: Interval
+    min_blocks: Count
+    max_deviation: Fraction
+
+
+@dataclass(frozen=True)
+class WallViewSettings:
+    """The wall's metric view.
+
+    Attributes
+    ----------
+    pixel
+        Its side on the wall, metres.
+    reach
+        Distance along the wall up to which it is looked at, metres.
+    heights
+        Above the floor, metres.
+    before, behind
+        Offsets of the inverse depth, in pixel noises, from which something stands before the wall,
+        and from which nothing of a door is there.
+    """
+
+    pixel: Positive
+    reach: Positive
+    heights: Interval
+    before: Positive
+    behind: Positive
+
+
+@dataclass(frozen=True)
+class LineSettings:
+    """What an upright edge looks like.
+
+    Attributes
+    ----------
+    piece
+        Height of the pieces that must show it, metres.
+    heights
+        Between which a door's edge is in any case, above the floor, metres.
+    smoothing
+        Of the gradient, pixels of the view.
+    min_contrast, noise_factor
+        Step of the logarithm of grey that counts in a piece: at least, and in noises of the piece.
+    min_coverage, min_pieces
+        Share of the visible pieces that must show it, and how many must be visible.
+    strip, gap
+        Widths of the strips whose depths are compared, and of the gap at the edge, metres.
+    step_noise
+        Standard deviation of a step of such strips, inverse depth, 1/m.
+    min_step
+        Steps of so many standard deviations are edges without any grey.
+    tie
+        Lines closer than this may be the same edge: frame, reveal and panel, metres.
+    """
+
+    piece: Positive
+    heights: Interval
+    smoothing: Positive
+    min_contrast: Positive
+    noise_factor: Positive
+    min_coverage: Fraction
+    min_pieces: Count
+    strip: Positive
+    gap: Positive
+    step_noise: Positive
+    min_step: Positive
+    tie: Positive
+
+
+class ScoreSettings(NamedTuple):
+    """Weights of what speaks for a pair of edges; see ``candidates.py``."""
+
+    opposite: float
+    contrast: float
+    max_contrast: float
+    inner_line: float
+    hollow: float
+    hidden: float
+    width: float
+    expected_width: float
+    step: float
+    handle: float
+    lintel: float
+    no_lintel: float
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """The fit of wall, panel and floor.
+
+    Attributes
+    ----------
+    pixel_noise, block_noise
+        Standard deviation of inverse depths, 1/m: of a block of pixels, and of the mean over
+        ``correlation`` pixels, whose errors are alike.
+    correlation
+        Pixels.
+    margin, frame, beside
+        Metres beside an edge that belong to neither side, that a frame may take, and up to which
+        the wall is looked at.
+    reach
+        Largest offset of wall and panel from the plane that was found, inverse depth, 1/m.
+    inlier
+        Pixel noises.
+    tilt
+        Standard deviation of the vertical, radians.
+    closed
+        Standard deviation of a closed panel's angle to its wall, radians.
+    ajar
+        Angle to the wall from which a door is open, radians, and in standard deviations.
+    min_blocks
+        That a wall or a panel must have.
+    edge_noise
+        Standard deviation of an edge's direction, pixels.
+    """
+
+    pixel_noise: Positive
+    block_noise: Positive
+    correlation: Positive
+    margin: Positive
+    frame: Positive
+    beside: Positive
+    reach: Positive
+    inlier: Positive
+    tilt: Positive
+    closed: Positive
+    ajar: tuple[float, float]
+    min_blocks: Count
+    edge_noise: Positive
+
+
+@dataclass(frozen=True)
+class HandleSettings:
+    """What a handle looks like on its panel.
+
+    Attributes
+    ----------
+    heights
+        Above the floor, metres.
+    reach
+        From the panel's edge, metres.
+    bar
+        Length and height of the mask of a lever, metres, and distance of the two masks above and
+        below it with which it is compared.
+    min_contrast, min_ratio, min_other
+        Of the logarithm of grey; its ratio to the panel's background; and to the other edge.
+    lever
+        Lengths from which it is a lever, metres.
+    protrusion
+        Of the handle's middle before the panel: value and standard deviation, metres.
+    bump
+        Depth: the handle's mean offset that counts, in standard deviations of such means.
+    along_noise, up_noise
+        Standard deviations of its middle, metres.
+    """
+
+    heights: Interval
+    reach: Positive
+    bar: tuple[float, float, float]
+    min_contrast: Positive
+    min_ratio: Positive
+    min_other: Positive
+    lever: Positive
+    protrusion: tuple[float, float]
+    bump: Positive
+    along_noise: Positive
+    up_noise: Positive
+
+
+@dataclass(frozen=True)
+class LintelSettings:
+    """The top of the door: heights at which it is sought, metres, and what shows it."""
+
+    heights: Interval
+    min_coverage: Fraction
+    min_contrast: Positive
+    noise: Positive
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """When a door is a door.
+
+    Attributes
+    ----------
+    width, height
+        Of doors, metres.
+    min_coverage
+        Share of an edge's visible pieces that show it.
+    min_step
+        Or the step in depth, standard deviations.
+    min_panel
+        Share of the panel's unhidden measurements that lie on it.
+    min_visible
+        Share of the panel that must be in view and unhidden.
+    rival
+        A different door within so much of the best one's score leaves the question open.
+    """
+
+    width: Interval
+    height: Interval
+    min_coverage: Fraction
+    min_step: Positive
+    min_panel: Fraction
+    min_visible: Fraction
+    rival: NonNegative
+
+
+class PriorSettings(NamedTuple):
+    """What is known of doors where the view does not show it: value and deviation, metres."""
+
+    height: tuple[float, float]
+    handle_height: tuple[float, float]
+    handle_inset: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DoorSettings:
+    """All of the above, and the sensor's calibration: deviation of its inverse depths, 1/m."""
+
+    planes: PlaneSettings
+    vertical: VerticalSettings
+    floor: FloorSettings
+    view: WallViewSettings
+    lines: LineSettings
+    score: ScoreSettings
+    fit: FitSettings
+    handle: HandleSettings
+    lintel: LintelSettings
+    verdict: VerdictSettings
+    prior: PriorSettings
+    candidates: Count
+    disparity_offset: NonNegative
+
+    @classmethod
+    def load(cls) -> DoorSettings:
+        """Read ``config/doors.yaml``.
+
+        Raises
+        ------
+        FileNotFoundError, ConfigurationError
+            If it is missing or wrong.
+        """
+        return load_settings(cls, resources.find("config", "doors"))

@@ -1,0 +1,110 @@
+"""Whether what was measured is a door: each of its parts must be supported by the frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.lines import Line
+from kmn_perception.doors.measuring import Measurement
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.surfaces import OFFSET, PANEL
+from kmn_perception.doors.wall_view import WallFrame
+
+
+def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
+    """Return the estimate of a measured candidate, with what it is worth."""
+    reason = _refusal(found, settings)
+    if reason:
+        status = DoorStatus.NO_DOOR
+    elif found.handle is None:
+        status = DoorStatus.HANDLE_NOT_SEEN
+        reason = "no handle is seen; it is sought " + _where(found)
+    else:
+        status = DoorStatus.OK
+    frame = found.candidate.view.frame
+    handle = found.handle
+    shape = found.shape
+
+    def place(point: np.ndarray, z: float) -> np.ndarray:
+        height = 1.0 / found.inverse_height
+        return point[0] * frame.right - point[1] * frame.normal + (z - height) * frame.up
+
+    line = found.surfaces.values[PANEL]
+    panel = line / np.linalg.norm(line)
+    return DoorEstimate(
+        status=status,
+        reason=reason,
+        values=found.values,
+        covariance=found.covariance,
+        handle_side="" if handle is None else handle.side,
+        handle_kind="" if handle is None else handle.kind,
+        camera_pose=_camera_pose(frame, 1.0 / found.inverse_height),
+        corners=np.array([place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]),
+        handle=place(shape.handle, shape.handle_height),
+        normal=-panel[0] * frame.right + panel[1] * frame.normal,
+        disparity_offset=(
+            float(found.surfaces.values[OFFSET]),
+            float(np.sqrt(found.surfaces.covariance[OFFSET, OFFSET])),
+        ),
+        score=_score(found, settings),
+    )
+
+
+def _score(found: Measurement, settings: DoorSettings) -> float:
+    """Return how much speaks for the candidate, with its handle and top."""
+    weight, score = settings.score, found.candidate.score
+    if found.handle is not None:
+        score += weight.handle * min(found.handle.ratio / (3.0 * settings.handle.min_ratio), 1.0)
+    if found.lintel.z is not None:
+        score += weight.lintel
+    elif found.lintel.seen_to > settings.verdict.height[1]:
+        score -= weight.no_lintel
+    return score
+
+
+def _refusal(found: Measurement, settings: DoorSettings) -> str:
+    """Return why the candidate is no door, or nothing."""
+    verdict, surfaces = settings.verdict, found.surfaces
+    for line, side in ((found.candidate.left, "left"), (found.candidate.right, "right")):
+        if not _is_edge(line, settings):
+            return (
+                f"the {side} edge shows in {100 * line.coverage:.0f} % of its height and a step of "
+                f"{abs(line.step):.1f} standard deviations"
+            )
+    low, high = verdict.width
+    width = 0.8 + found.values[4]
+    if not low <= width <= high:
+        return f"the edges are {width:.2f} m apart, doors are {low:g} to {high:g} m wide"
+    if surfaces.panel_visible < verdict.min_visible:
+        return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
+    if surfaces.panel_share < verdict.min_panel:
+        return f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
+    low, high = verdict.height
+    if found.lintel.z is not None and not low <= found.lintel.z <= high:
+        return f"the top is at {found.lintel.z:.2f} m, doors are {low:g} to {high:g} m high"
+    if found.lintel.z is None and found.lintel.seen_to > high and found.candidate.view.grey is not None:
+        return f"no top is seen up to {found.lintel.seen_to:.2f} m"
+    return ""
+
+
+def _is_edge(line: Line, settings: DoorSettings) -> bool:
+    verdict = settings.verdict
+    return line.coverage >= verdict.min_coverage or abs(line.step) >= verdict.min_step
+
+
+def _where(found: Measurement) -> str:
+    point = found.shape.handle
+    return f"{found.shape.handle_height:.2f} m above the floor at either edge, {point[1]:.1f} m away"
+
+
+def _camera_pose(frame: WallFrame, height: float) -> np.ndarray:
+    """Return the optical frame in the world: z up, x where it looks, the floor below it at 0."""
+    forward = np.array([0.0, 0.0, 1.0])
+    forward = forward - (forward @ frame.up) * frame.up
+    forward /= np.linalg.norm(forward)
+    left = np.cross(frame.up, forward)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([forward, left, frame.up])
+    pose[2, 3] = height
+    return pose

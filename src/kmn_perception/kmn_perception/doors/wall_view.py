@@ -1,0 +1,157 @@
+"""The metric view of a wall: what a camera that looks at it squarely would see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.settings import WallViewSettings
+from kmn_perception.model.camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class WallFrame:
+    """A vertical plane with its axes in the optical frame.
+
+    Attributes
+    ----------
+    normal, right, up
+        (3,) unit vectors: towards the camera, to the right as seen, and up.
+    distance
+        Of the camera from the plane, metres.
+    height
+        Of the camera above the floor, metres.
+    """
+
+    normal: NDArray[np.float64]
+    right: NDArray[np.float64]
+    up: NDArray[np.float64]
+    distance: float
+    height: float
+
+    @classmethod
+    def of(cls, vector: NDArray[np.float64], up: NDArray[np.float64], height: float) -> WallFrame:
+        """Return the frame of the vertical plane nearest to a plane's vector, see `Plane`."""
+        level = vector - (vector @ up) * up
+        length = float(np.linalg.norm(level))
+        normal = -level / length
+        return cls(normal, np.cross(up, normal), up, 1.0 / length, height)
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """(3,) normal over distance, see `Plane.vector`."""
+        return -self.normal / self.distance
+
+    def points(self, s: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points (..., 3) at s metres to the right and z metres above the floor."""
+        foot = -self.distance * self.normal - self.height * self.up
+        return foot + s[..., None] * self.right + z[..., None] * self.up
+
+
+@dataclass(frozen=True, eq=False)
+class WallView:
+    """A wall, seen squarely; rows go down.
+
+    Attributes
+    ----------
+    frame
+        The plane that is seen.
+    s, z
+        (columns,) metres to the right of the camera, and (rows,) metres above the floor.
+    grey
+        (rows, columns) logarithm of grey; None without an image.
+    offset
+        (rows, columns) inverse depth less that of the plane, 1/m; positive before it, NaN where
+        nothing was measured.
+    inside
+        (rows, columns) what is in the image.
+    footprint
+        (columns,) width of an image's pixel on the wall, metres.
+    """
+
+    frame: WallFrame
+    s: NDArray[np.float64]
+    z: NDArray[np.float64]
+    grey: NDArray[np.float32] | None
+    offset: NDArray[np.float32]
+    inside: NDArray[np.bool_]
+    footprint: NDArray[np.float64]
+
+
+DARKEST = 0.03  # grey value that is added before the logarithm
+
+
+def view_wall(
+    frame: WallFrame,
+    depth: NDArray[np.float32],
+    grey: NDArray[np.float32] | None,
+    camera: Camera,
+    settings: WallViewSettings,
+) -> WallView | None:
+    """Return the metric view of a wall, or None if little of it is in the image.
+
+    Parameters
+    ----------
+    depth, grey
+        (height, width) metres, 0 for none; and 0 to 1.
+    """
+    s = _columns_in_view(frame, camera, settings)
+    if len(s) < 2:
+        return None
+    low, high = settings.heights
+    return resample(frame, s, np.arange(high, low, -settings.pixel), depth, grey, camera)
+
+
+def resample(
+    frame: WallFrame,
+    s: NDArray[np.float64],
+    z: NDArray[np.float64],
+    depth: NDArray[np.float32],
+    grey: NDArray[np.float32] | None,
+    camera: Camera,
+) -> WallView:
+    """Return what is seen of a plane at columns s and rows z, metres; see `view_wall`."""
+    start = frame.points(s[:1], z[:1])[0]
+    # Pixel times depth, depth: affine in columns and rows.
+    origin = camera.matrix @ start
+    step_s = camera.matrix @ frame.right
+    step_z = camera.matrix @ frame.up
+    ds, dz = (s - s[0]).astype(np.float32), (z - z[0]).astype(np.float32)
+    scaled = [
+        np.float32(origin[k]) + ds * np.float32(step_s[k]) + (dz * np.float32(step_z[k]))[:, None]
+        for k in range(3)
+    ]
+    plane_depth = np.maximum(scaled[2], np.float32(1e-3))
+    u, v = scaled[0] / plane_depth, scaled[1] / plane_depth
+    inside = (scaled[2] > camera.near) & (u > 0.0) & (u < camera.width - 1.0)
+    inside &= (v > 0.0) & (v < camera.height - 1.0)
+    seen = cv2.remap(depth, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
+    with np.errstate(divide="ignore"):
+        offset = 1.0 / seen - 1.0 / plane_depth
+    offset[(seen <= 0.0) | ~inside] = np.nan
+    shade = None
+    if grey is not None:
+        shade = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shade = np.log(np.maximum(shade, 0.0) + np.float32(DARKEST))
+    # Along a level line: the change of direction with s, in pixels.
+    footprint = (frame.distance**2 + s**2) / frame.distance / camera.fx
+    return WallView(frame, s, z, shade, offset, inside, footprint)
+
+
+def _columns_in_view(
+    frame: WallFrame, camera: Camera, settings: WallViewSettings
+) -> NDArray[np.float64]:
+    """Return the columns (metres) of which something is in the image."""
+    s = np.arange(-settings.reach, settings.reach, settings.pixel)
+    probes = np.linspace(*settings.heights, 13)
+    points = frame.points(*np.broadcast_arrays(s, probes[:, None]))
+    depth = points[..., 2]
+    ahead = depth > camera.near
+    pixels = points @ camera.matrix.T / np.where(ahead, depth, 1.0)[..., None]
+    inside = ahead & (pixels[..., 0] > 0.0) & (pixels[..., 0] < camera.width - 1.0)
+    inside &= (pixels[..., 1] > 0.0) & (pixels[..., 1] < camera.height - 1.0)
+    visible = np.flatnonzero(inside.any(axis=0) & (np.hypot(s, frame.distance) < settings.reach))
+    return s[visible[0] : visible[-1] + 1] if len(visible) else s[:0]

@@ -18,7 +18,7 @@ MEASURED = (
     "wall_b", "wall_c", "panel_b", "panel_c", "inverse_height",
     "left", "right",              # directions, metres to the right per metre away
     "left_on_panel", "right_on_panel",  # 0: the edge seen is the frame's, 1: the panel's own
-    "top",                        # height above the floor, metres
+    "top_rise",                   # direction of the top, up per metre away, above the middle
     "handle", "handle_rise",      # directions to the right, and up, per metre away
     "protrusion",                 # of the handle's middle before the panel, metres
 )  # fmt: skip
@@ -76,8 +76,10 @@ def door_shape(m: NDArray[np.float64], handle_left: bool, ajar: bool) -> DoorSha
     hinge = right if handle_left else left
     at = hinge if ajar else 0.5 * (left + right)
     recess = (wall @ at - 1.0) / np.linalg.norm(wall)
+    over = np.array([0.5 * (m[5] + m[6]), 1.0])
+    top = 1.0 / m[4] + m[9] / (wall @ over)
     height = 1.0 / m[4] + m[11] * grip[1]
-    return DoorShape(left, right, grip, height, m[9], turn if ajar else 0.0, recess)
+    return DoorShape(left, right, grip, height, top, turn if ajar else 0.0, recess)
 
 
 def door_values(

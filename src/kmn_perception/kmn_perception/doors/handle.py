@@ -15,7 +15,10 @@ from kmn_perception.model.camera import Camera
 _FLOOR_OF_NOISE = 0.005  # of the logarithm of grey
 _PIXEL = 0.005  # metres
 _JOINED = 3  # pixels of a handle that may look like the panel
-_KNOB = 0.025  # metres from the middle of a knob to its rim
+_REACH = 0.12  # metres to either side of the peak that a handle may reach
+_EXTENT = 0.25  # of its largest contrast that still belongs to it
+_LEVER, _KNOB = 0.145, 0.055  # metres that they measure
+_AMBIGUOUS = 0.04  # metres: lengths that differ by less do not tell a lever from a knob
 
 
 class Handle(NamedTuple):
@@ -104,32 +107,57 @@ def _in_grey(
     if not background.size:
         return None
     noise = 1.48 * float(np.median(background)) + _FLOOR_OF_NOISE
+    # A darker surface beside the panel may be noisier.
+    noises = {
+        side: max(noise, 1.48 * float(np.median(answer[level][:, window])) if window.any() else 0.0)
+        for side, window in windows.items()
+    }
     peaks = {side: float(answer[level][:, window].max(initial=0.0)) for side, window in windows.items()}
     side = max(peaks, key=lambda name: peaks[name])
+    noise = noises[side]
     other = peaks[side] / max(peaks["right" if side == "left" else "left"], noise)
     ratio = peaks[side] / noise
     if peaks[side] < settings.min_contrast or ratio < settings.min_ratio or other < settings.min_other:
         return None
     masked = np.where(level[:, None] & windows[side], answer, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
-    first, last = _extent(view.grey, int(row), int(column), settings)
+    first, last = _extent(view.grey, int(row), int(column), noise, settings)
     rows = slice(max(row - 4, 0), row + 5)
     weights = np.maximum(answer[rows, first : last + 1].mean(axis=1) - 0.5 * peaks[side] * 0.5, 0.0)
     z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
-    length = view.s[last] - view.s[first]
     shift = shifts[edges[0] if side == "left" else edges[1]]
-    kind = "lever" if length > settings.lever else "knob"
-    noise_along = settings.along_noise
-    middle_s = 0.5 * (view.s[first] + view.s[last])
-    outward = -1.0 if side == "left" else 1.0
-    if abs(shift) > 0.5 * settings.lever and shift * outward > 0.0:
-        # A knob's neck is seen from its side, and looks like a lever: its head is the far end.
-        end = view.s[last] if outward > 0.0 else view.s[first]
-        if abs(length - abs(shift) - 2.0 * _KNOB) < 0.03:
-            kind = "knob"
-            middle_s = end - outward * _KNOB
-        noise_along = max(noise_along, 0.25 * abs(shift))
+    outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
+    kind, middle_s, sure = _kind(float(view.s[first]), float(view.s[last]), shift, outward)
+    noise_along = settings.along_noise if sure else max(settings.along_noise, 0.4 * abs(shift))
     return Handle(side, kind, float(middle_s), z, ratio, other, noise_along)
+
+
+def _kind(first: float, last: float, shift: float, outward: bool) -> tuple[str, float, bool]:
+    """Return what spans from first to last, where its middle is seen, and whether that is sure.
+
+    What stands out is seen shifted against its foot, and the neck between them joins the two. A
+    lever points inward: it hides its neck where the shift is outward, and prolongs it elsewhere.
+
+    Parameters
+    ----------
+    first, last
+        Along the panel, metres.
+    shift
+        Of a handle's middle against the point of the panel behind it, metres to the right.
+    outward
+        Whether that is towards the panel's nearer edge.
+    """
+    length = last - first
+    as_lever = _LEVER + (0.0 if outward else abs(shift))
+    as_knob = _KNOB + abs(shift)
+    kind = "lever" if abs(length - as_lever) < abs(length - as_knob) else "knob"
+    sure = abs(as_lever - as_knob) > _AMBIGUOUS
+    head, inward = (last, -1.0) if shift > 0.0 else (first, 1.0)
+    if kind == "knob":
+        half = 0.5 * max(length - abs(shift), _KNOB)
+    else:
+        half = 0.5 * (length if outward else max(length - abs(shift), _KNOB))
+    return kind, head + inward * half, sure
 
 
 def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> NDArray[np.float32]:
@@ -146,26 +174,30 @@ def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> 
 
 
 def _extent(
-    grey: NDArray[np.float32], row: int, column: int, settings: HandleSettings
+    grey: NDArray[np.float32], row: int, column: int, noise: float, settings: HandleSettings
 ) -> tuple[int, int]:
-    """Return first and last column of what differs from the rows above and below."""
+    """Return first and last column of what differs from the panel above it, as the peak does.
+
+    Above, not below: there may be its shadow, a rosette or a keyhole.
+    """
     gap = round(settings.bar[2] / _PIXEL)
+    lean = round(0.5 * settings.bar[1] / _PIXEL)
     thin = cv2.blur(grey, (3, 3), borderType=cv2.BORDER_REPLICATE)
-    rows = [min(max(row + k, 0), len(grey) - 1) for k in (-gap, 0, gap)]
-    contrast = np.abs(thin[rows[1]] - 0.5 * (thin[rows[0]] + thin[rows[2]]))
-    reach = round(0.12 / _PIXEL)
+    above = thin[max(row - gap - lean, 0)]
+    band = thin[max(row - lean, 0) : row + lean + 1] - above
+    sign = np.sign(band[:, column][np.abs(band[:, column]).argmax()])
+    contrast = (sign * band).max(axis=0)
+    reach = round(_REACH / _PIXEL)
     window = slice(max(column - reach, 0), column + reach + 1)
-    on_it = contrast > 0.4 * contrast[window].max()
-    first = last = column
-    for step in (-1, 1):
-        end, misses = column, 0
-        i = column
+    on_it = contrast > max(_EXTENT * float(contrast[window].max()), 4.0 * noise)
+    ends = [column, column]
+    for k, step in enumerate((-1, 1)):
+        misses, i = 0, column
         while 0 <= i + step < len(on_it) and misses < _JOINED and abs(i - column) < 2 * reach:
             i += step
             misses = 0 if on_it[i] else misses + 1
-            end = i if on_it[i] else end
-        first, last = (end, last) if step < 0 else (first, end)
-    return first, last
+            ends[k] = i if on_it[i] else ends[k]
+    return ends[0], ends[1]
 
 
 def _in_depth(

@@ -21,7 +21,7 @@ class Lintel(NamedTuple):
     z
         Height of the edge above the floor, metres; None where no edge was found.
     seen_to
-        Height up to which the door is in view, metres.
+        Height up to which an edge would have been seen, metres; 0 where depth alone shows none.
     """
 
     z: float | None
@@ -35,7 +35,9 @@ def find_lintel(view: WallView, left: int, right: int, settings: LintelSettings)
     enough = np.flatnonzero(inside.mean(axis=1) > 0.5)
     seen_to = float(view.z[enough[0]]) if len(enough) else 0.0
     low, high = settings.heights
-    if view.grey is None or seen_to < low:
+    if view.grey is None:
+        return Lintel(None, 0.0)
+    if seen_to < low:
         return Lintel(None, seen_to)
     x = np.arange(-6, 7)
     weights = x * np.exp(-0.5 * (x / 2.0) ** 2)

@@ -65,7 +65,7 @@ def measure(
     edges = [_edge(candidate, line, settings) for line in (candidate.left, candidate.right)]
     directions = edges[0][0], edges[1][0]
     surfaces = fit_surfaces(
-        blocks, at, directions, floor, settings.disparity_offset, settings.fit
+        blocks, at, directions, floor, settings.calibration, settings.fit
     )
     if surfaces is None:
         return None
@@ -167,10 +167,16 @@ def _gather(
         else:
             told = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
         values[7 + i], deviations[7 + i] = told
-    values[9], deviations[9] = _top(lintel, settings)
     middle = 0.5 * (edges[0][0] + edges[1][0])
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
+    far = 1.0 / float(wall_line @ np.array([middle, 1.0]))
+    if lintel.z is None:
+        top, deviation = _usual_top(lintel, settings)
+        values[9], deviations[9] = (top - height) / far, deviation / far
+    else:
+        values[9] = (lintel.z - at.height) / at.distance
+        deviations[9] = settings.lintel.noise / at.distance
     covariance = np.zeros((13, 13))
     covariance[:5, :5] = surfaces.covariance[:5, :5]
     if handle is None:
@@ -201,12 +207,11 @@ def _gather(
     return values, covariance
 
 
-def _top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:
-    """Return height of the top and its standard deviation, by the usual heights if it is not seen."""
-    if lintel.z is not None:
-        return lintel.z, settings.lintel.noise
+def _usual_top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:
+    """Return height and standard deviation of a top that is not seen: above all that is seen."""
     mean, deviation = settings.prior.height
-    grid = np.linspace(min(lintel.seen_to, mean + 2.0 * deviation), mean + 3.0 * deviation, 200)
+    low = min(max(lintel.seen_to, mean - 3.0 * deviation), mean + 2.0 * deviation)
+    grid = np.linspace(low, mean + 3.0 * deviation, 200)
     weights = np.exp(-0.5 * ((grid - mean) / deviation) ** 2)
     value = float(np.average(grid, weights=weights))
     return value, float(np.sqrt(np.average((grid - value) ** 2, weights=weights)))

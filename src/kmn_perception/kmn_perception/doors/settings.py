@@ -163,6 +163,18 @@ class ScoreSettings(NamedTuple):
     no_lintel: float
 
 
+class Calibration(NamedTuple):
+    """How well a sensor is calibrated: standard deviations of errors of its inverse depths.
+
+    ``offset`` in 1/m, of all; ``slope`` and ``bend`` over the image, in 1/m per metre at a depth of
+    1 m to the side, and per square of it.
+    """
+
+    offset: Positive
+    slope: Positive
+    bend: Positive
+
+
 @dataclass(frozen=True)
 class FitSettings:
     """The fit of wall, panel and floor.
@@ -221,10 +233,10 @@ class HandleSettings:
     bar
         Length and height of the mask of a lever, metres, and distance of the two masks above and
         below it with which it is compared.
+    inset
+        Distances of its middle from the panel's edge, metres.
     min_contrast, min_ratio, min_other
         Of the logarithm of grey; its ratio to the panel's background; and to the other edge.
-    lever
-        Lengths from which it is a lever, metres.
     protrusion
         Of the handle's middle before the panel: value and standard deviation, metres.
     bump
@@ -235,11 +247,11 @@ class HandleSettings:
 
     heights: Interval
     reach: Positive
+    inset: Interval
     bar: tuple[float, float, float]
     min_contrast: Positive
     min_ratio: Positive
     min_other: Positive
-    lever: Positive
     protrusion: tuple[float, float]
     bump: Positive
     along_noise: Positive
@@ -295,7 +307,7 @@ class PriorSettings(NamedTuple):
 
 @dataclass(frozen=True)
 class DoorSettings:
-    """All of the above, and the sensor's calibration: deviation of its inverse depths, 1/m."""
+    """All of the above, and the sensor's calibration."""
 
     planes: PlaneSettings
     vertical: VerticalSettings
@@ -309,7 +321,7 @@ class DoorSettings:
     verdict: VerdictSettings
     prior: PriorSettings
     candidates: Count
-    disparity_offset: NonNegative
+    calibration: Calibration
 
     @classmethod
     def load(cls) -> DoorSettings:

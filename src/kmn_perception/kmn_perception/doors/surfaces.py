@@ -2,8 +2,9 @@
 
 Seen from above, with x to the right and y away from the camera, a vertical plane is the line
 b x + c y = 1, and a ray (x, y, up) sees the inverse depth b x + c y there. The floor at a height h
-below gives -up / h. A wrong offset of the disparity adds the same to all of them; it shows where
-the floor or a tilted view ties depths to the vertical. All of this is linear.
+below gives -up / h. A sensor whose calibration is off adds an offset to all of them, and a warp
+over the image; they show where the floor or a tilted view ties depths to the vertical, and where
+wall and panel should be parallel. All of this is linear.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
-from kmn_perception.doors.settings import FitSettings
+from kmn_perception.doors.settings import Calibration, FitSettings
 from kmn_perception.doors.wall_view import WallFrame
 
-WALL, PANEL, FLOOR, OFFSET, TILT = slice(0, 2), slice(2, 4), 4, 5, slice(6, 8)
-SIZE = 8
+WALL, PANEL, FLOOR, TILT, OFFSET, WARP = slice(0, 2), slice(2, 4), 4, slice(5, 7), 7, slice(7, 11)
+SIZE = 11
 _TRIALS, _ROUNDS = 150, 5
 _LOW, _HIGH, _PANEL_HIGH = 0.1, 2.4, 1.95  # metres above the floor between which blocks are taken
 _MAX_TURN = 0.6  # radians to the plane that was found
@@ -30,10 +31,11 @@ class Surfaces(NamedTuple):
     Attributes
     ----------
     values
-        (8,) wall (b, c), panel (b, c), 1 / height of the camera, offset of the inverse depths
-        (1/m), tilts of the vertical to the right and away (radians).
+        (11,) wall (b, c), panel (b, c), 1 / height of the camera, tilts of the vertical to the
+        right and away (radians), offset of the inverse depths (1/m), and its warp: per metre to the
+        right and down in the image at a depth of 1 m, and per square of the former.
     covariance
-        (8, 8) of these.
+        (11, 11) of these.
     wall_blocks, panel_blocks
         How many blocks lie on them.
     panel_share
@@ -54,11 +56,12 @@ class Surfaces(NamedTuple):
 
 
 class _Data(NamedTuple):
-    """Blocks in the wall's axes: right, away, up (N,), and the inverse depths (N,)."""
+    """Blocks: rays in the wall's axes, right, away, up (N,); warp (N, 4); inverse depths (N,)."""
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     up: NDArray[np.float64]
+    warp: NDArray[np.float64]
     inverse: NDArray[np.float64]
 
 
@@ -67,7 +70,7 @@ def fit_surfaces(
     frame: WallFrame,
     edges: tuple[float, float],
     floor: bool,
-    disparity_offset: float,
+    calibration: Calibration,
     settings: FitSettings,
 ) -> Surfaces | None:
     """Fit wall, panel and floor about two edges; None where wall or panel are hardly measured.
@@ -78,11 +81,13 @@ def fit_surfaces(
         Directions of the left and right edge, metres to the right per metre away.
     floor
         Whether the frame's height is known from the floor.
-    disparity_offset
-        Standard deviation of the sensor's offset of inverse depths, 1/m.
+    calibration
+        Of the sensor.
     """
     rays, inverse, valid = blocks.flat()
-    data = _Data(rays @ frame.right, -rays @ frame.normal, rays @ frame.up, inverse)
+    u, v = rays[:, 0], rays[:, 1]
+    warp = np.stack([np.ones_like(u), u, v, u * u], axis=-1)
+    data = _Data(rays @ frame.right, -rays @ frame.normal, rays @ frame.up, warp, inverse)
     ahead = data.y > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         side = np.where(ahead, data.x / data.y, np.inf) * frame.distance
@@ -102,16 +107,16 @@ def fit_surfaces(
         return None
     wall, panel = lines
     below = valid & (data.up < 0.0) if floor else np.zeros_like(valid)
-    start = np.array([*wall, *panel, 1.0 / frame.height, 0.0, 0.0, 0.0])
+    start = np.array([*wall, *panel, 1.0 / frame.height, *np.zeros(SIZE - 5)])
     values, covariance, masks = _solve(
-        data, (*regions, below), start, None, disparity_offset, settings
+        data, (*regions, below), start, None, calibration, settings
     )
     if min(masks[0].sum(), masks[1].sum()) < settings.min_blocks:
         return None
     opening = _opening(values, covariance, settings)
     if opening == 0.0:
         values, covariance, masks = _solve(
-            data, (*regions, below), values, settings.closed, disparity_offset, settings
+            data, (*regions, below), values, settings.closed, calibration, settings
         )
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)
@@ -144,7 +149,7 @@ def _opening(
 
 
 def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivatives (8,) of the panel's angle to the wall."""
+    """Return the derivatives (11,) of the panel's angle to the wall."""
     row = np.zeros(SIZE)
     for part, sign in ((PANEL, 1.0), (WALL, -1.0)):
         b, c = values[part]
@@ -179,10 +184,10 @@ def _start(
 def _rows(
     data: _Data, mask: NDArray[np.bool_], part: slice | int, values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the derivatives (N, 8) of the inverse depths of blocks on a surface."""
+    """Return the derivatives (N, 11) of the inverse depths of blocks on a surface."""
     x, y, up = data.x[mask], data.y[mask], data.up[mask]
     rows = np.zeros((len(x), SIZE))
-    rows[:, OFFSET] = 1.0
+    rows[:, WARP] = data.warp[mask]
     if isinstance(part, slice):
         rows[:, part] = np.stack([x, y], axis=-1)
         rows[:, TILT] = -up[:, None] * values[part]
@@ -205,7 +210,7 @@ def _solve(
     regions: tuple[NDArray[np.bool_], ...],
     start: NDArray[np.float64],
     closed: float | None,
-    disparity_offset: float,
+    calibration: Calibration,
     settings: FitSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.bool_]]]:
     """Return values, covariance, and the blocks that lie on each surface."""
@@ -214,7 +219,9 @@ def _solve(
     weight = 1.0 / settings.block_noise**2 / (settings.correlation / 8.0) ** 2
     reach = settings.inlier * settings.pixel_noise
     prior = np.zeros((SIZE, SIZE))
-    prior[OFFSET, OFFSET] = 1.0 / max(disparity_offset, 1e-6) ** 2
+    slope = calibration.slope
+    deviations = np.array([calibration.offset, slope, slope, calibration.bend])
+    prior[WARP, WARP] = np.diag(deviations**-2.0)
     prior[TILT, TILT] = np.eye(2) / settings.tilt**2
     masks: list[NDArray[np.bool_]] = []
     for _ in range(_ROUNDS):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.geometry import DOOR, HANDLE_INSET
 from kmn_perception.doors.lines import Line
 from kmn_perception.doors.measuring import Measurement
 from kmn_perception.doors.settings import DoorSettings
@@ -15,15 +16,15 @@ from kmn_perception.doors.wall_view import WallFrame
 def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     """Return the estimate of a measured candidate, with what it is worth."""
     reason = _refusal(found, settings)
+    handle = found.handle if _is_on_panel(found, settings) else None
     if reason:
         status = DoorStatus.NO_DOOR
-    elif found.handle is None:
+    elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
         reason = "no handle is seen; it is sought " + _where(found)
     else:
         status = DoorStatus.OK
     frame = found.candidate.view.frame
-    handle = found.handle
     shape = found.shape
 
     def place(point: np.ndarray, z: float) -> np.ndarray:
@@ -66,11 +67,19 @@ def _score(found: Measurement, settings: DoorSettings) -> float:
 def _refusal(found: Measurement, settings: DoorSettings) -> str:
     """Return why the candidate is no door, or nothing."""
     verdict, surfaces = settings.verdict, found.surfaces
-    for line, side in ((found.candidate.left, "left"), (found.candidate.right, "right")):
+    lines = found.candidate.left, found.candidate.right
+    for line, side in zip(lines, ("left", "right"), strict=True):
         if not _is_edge(line, settings):
             return (
                 f"the {side} edge shows in {100 * line.coverage:.0f} % of its height and a step of "
                 f"{abs(line.step):.1f} standard deviations"
+            )
+    if not all(line.coverage >= verdict.min_coverage for line in lines):
+        recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+        if surfaces.opening == 0.0 and abs(recess) < verdict.min_step * deviation:
+            return (
+                f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
+                f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
             )
     low, high = verdict.width
     width = 0.8 + found.values[4]
@@ -81,9 +90,10 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     if surfaces.panel_share < verdict.min_panel:
         return f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
     low, high = verdict.height
-    if found.lintel.z is not None and not low <= found.lintel.z <= high:
-        return f"the top is at {found.lintel.z:.2f} m, doors are {low:g} to {high:g} m high"
-    if found.lintel.z is None and found.lintel.seen_to > high and found.candidate.view.grey is not None:
+    top, slack = found.shape.top, 2.0 * np.sqrt(found.covariance[3, 3])
+    if found.lintel.z is not None and not low - slack <= top <= high + slack:
+        return f"the top is at {top:.2f} m, doors are {low:g} to {high:g} m high"
+    if found.lintel.z is None and found.lintel.seen_to > high:
         return f"no top is seen up to {found.lintel.seen_to:.2f} m"
     return ""
 
@@ -91,6 +101,15 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
 def _is_edge(line: Line, settings: DoorSettings) -> bool:
     verdict = settings.verdict
     return line.coverage >= verdict.min_coverage or abs(line.step) >= verdict.min_step
+
+
+def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:
+    """Return whether the handle is as far from the edge as handles are, within its deviation."""
+    i = DOOR.index("handle_y")
+    inset, slack = HANDLE_INSET + found.values[i], 2.0 * np.sqrt(found.covariance[i, i])
+    low, high = settings.handle.inset
+    slack = min(slack, low)
+    return bool(low - slack <= inset <= high + slack)
 
 
 def _where(found: Measurement) -> str:

@@ -152,18 +152,23 @@ def _steps_without_grey(
     ]
 
 
-def _gradient(
-    grey: NDArray[np.float32], usable: NDArray[np.bool_], smoothing: float
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return the steps of grey to the right, and where they are not beside what is unknown."""
+def gaussian_steps(grey: NDArray[np.float32], smoothing: float) -> NDArray[np.float32]:
+    """Return the step to the right about each pixel: a Gaussian's derivative, scaled to steps."""
     reach = int(np.ceil(3.0 * smoothing))
     x = np.arange(-reach, reach + 1)
     weights = x * np.exp(-0.5 * (x / smoothing) ** 2)
     weights *= smoothing * np.sqrt(2.0 * np.pi) / (weights * x).sum()
-    filled = np.where(usable, grey, np.float32(0.0))
     kernel = weights[None].astype(np.float32)
-    steps = cv2.filter2D(filled, -1, kernel, borderType=cv2.BORDER_REPLICATE)
-    known = cv2.erode(usable.astype(np.uint8), np.ones((1, 2 * reach + 1), np.uint8)) > 0
+    return cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+
+
+def _gradient(
+    grey: NDArray[np.float32], usable: NDArray[np.bool_], smoothing: float
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the steps of grey to the right, and where they are not beside what is unknown."""
+    steps = gaussian_steps(np.where(usable, grey, np.float32(0.0)), smoothing)
+    width = 2 * int(np.ceil(3.0 * smoothing)) + 1
+    known = cv2.erode(usable.astype(np.uint8), np.ones((1, width), np.uint8)) > 0
     return np.clip(steps, -CLIP, CLIP) * known, known
 
 

@@ -7,10 +7,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from kmn_perception.doors.lines import gaussian_steps
 from kmn_perception.doors.settings import LintelSettings
 from kmn_perception.doors.wall_view import WallView
 
 _PIECE = 0.1  # metres
+_SMOOTHING = 2.0  # pixels of the view
+_SEEN = 0.45  # of the width that a top must be seen in; a poster is narrower
 
 
 class Lintel(NamedTuple):
@@ -28,26 +31,31 @@ class Lintel(NamedTuple):
     seen_to: float
 
 
-def find_lintel(view: WallView, left: int, right: int, settings: LintelSettings) -> Lintel:
-    """Find the level edge above a door between two columns of its wall's view."""
+def find_lintel(
+    view: WallView,
+    left: int,
+    right: int,
+    heights: tuple[float, float],
+    settings: LintelSettings,
+) -> Lintel:
+    """Find the level edge above a door between two columns of its wall's view.
+
+    Parameters
+    ----------
+    heights
+        Between which it is sought in the view, metres above the floor.
+    """
     inner = slice(left + 6, max(right - 6, left + 7))
     inside = view.inside[:, inner]
     enough = np.flatnonzero(inside.mean(axis=1) > 0.5)
     seen_to = float(view.z[enough[0]]) if len(enough) else 0.0
-    low, high = settings.heights
+    low, high = heights
     if view.grey is None:
         return Lintel(None, 0.0)
     if seen_to < low:
         return Lintel(None, seen_to)
-    x = np.arange(-6, 7)
-    weights = x * np.exp(-0.5 * (x / 2.0) ** 2)
-    weights *= 2.0 * np.sqrt(2.0 * np.pi) / (weights * x).sum()
-    steps = cv2.filter2D(
-        np.where(inside, view.grey[:, inner], 0.0).astype(np.float32),
-        -1,
-        weights[:, None].astype(np.float32),
-        borderType=cv2.BORDER_REPLICATE,
-    )
+    shade = np.where(inside, view.grey[:, inner], np.float32(0.0))
+    steps = gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T
     known = cv2.erode(inside.astype(np.uint8), np.ones((13, 1), np.uint8)) > 0
     size = max(1, round(_PIECE / abs(float(view.s[1] - view.s[0]))))
     count = steps.shape[1] // size
@@ -64,7 +72,7 @@ def find_lintel(view: WallView, left: int, right: int, settings: LintelSettings)
         coverage = ((near > settings.min_contrast) & told).sum(axis=1) / visible
         contrast = (np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0)).sum(axis=1) / visible
         rows = (view.z > low) & (view.z < high) & (coverage >= settings.min_coverage)
-        rows &= told.sum(axis=1) >= 0.5 * count
+        rows &= ((near > settings.min_contrast) & told).sum(axis=1) >= _SEEN * count
         if rows.any():
             row = int(np.where(rows, contrast, -1.0).argmax())
             if best is None or contrast[row] > best[0]:

@@ -17,7 +17,7 @@ from kmn_perception.doors.geometry import (
 )
 from kmn_perception.doors.handle import Handle, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
-from kmn_perception.doors.lines import Line, Pieces
+from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
 from kmn_perception.doors.lintel import Lintel, find_lintel
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
@@ -26,7 +26,7 @@ from kmn_perception.doors.wall_view import WallFrame, WallView
 if TYPE_CHECKING:
     from kmn_perception.doors.door_finder import Frame
 
-_VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
+_VISIBLE_REVEAL = (0.25, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
 
@@ -69,7 +69,10 @@ def measure(
     )
     if surfaces is None:
         return None
-    lintel = find_lintel(candidate.view, candidate.left.column, candidate.right.column, settings.lintel)
+    lintel = find_lintel(
+        candidate.view, candidate.left.column, candidate.right.column,
+        _lintel_heights(at, directions, surfaces, settings), settings.lintel,
+    )  # fmt: skip
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
     on_panel = tuple(_along(at, panel, surfaces, direction) for direction in directions)
     handle = find_handle(
@@ -87,6 +90,17 @@ def measure(
     return Measurement(
         candidate, surfaces, lintel, handle, shape, values, spread, float(measured[4]), floor
     )
+
+
+def _lintel_heights(
+    at: WallFrame, directions: tuple[float, float], surfaces: Surfaces, settings: DoorSettings
+) -> tuple[float, float]:
+    """Return where tops may be in the view, whose scale the fit may have corrected."""
+    middle = np.array([0.5 * sum(directions), 1.0])
+    scale = at.distance * float(surfaces.values[WALL] @ middle)
+    floor = 1.0 / surfaces.values[FLOOR]
+    low, high = ((z - floor) * scale + at.height for z in settings.lintel.heights)
+    return low, high
 
 
 def _vector(frame: WallFrame, line: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -117,18 +131,25 @@ def _subpixel(
     view: WallView, pieces: Pieces, line: Line, settings: DoorSettings
 ) -> tuple[float, float]:
     """Return the place of an edge and the standard deviation of its mean, metres."""
-    reach = 5
+    assert view.grey is not None
+    fine = settings.lines.fine_smoothing
+    reach = round(0.5 * settings.lines.tie / float(view.s[1] - view.s[0])) + int(np.ceil(3 * fine))
     first = max(line.column - reach, 0)
     columns = slice(first, line.column + reach + 1)
     places = []
     for k in np.flatnonzero(pieces.body):
         if not pieces.known[k, columns].mean() > 0.7:
             continue
-        profile = line.sign * pieces.gradient[k, columns]
-        if profile.max() < 0.6 * settings.lines.min_contrast:
+        shade = view.grey[pieces.rows == k, columns].mean(axis=0)
+        profile = line.sign * gaussian_steps(shade[None], fine)[0]
+        near = np.abs(first + np.arange(len(profile)) - line.column) <= 3
+        if profile[near].max() < 0.6 * settings.lines.min_contrast:
             continue
-        weights = np.maximum(profile - 0.5 * profile.max(), 0.0)
-        places.append(first + float((weights * np.arange(len(weights))).sum() / weights.sum()))
+        peak = int(np.where(near, profile, -1.0).argmax())
+        window = slice(max(peak - 2, 0), peak + 3)
+        weights = np.maximum(profile[window] - 0.5 * profile[peak], 0.0)
+        at = first + window.start + np.arange(len(weights))
+        places.append(float((weights * at).sum() / weights.sum()))
     pixel = float(view.s[1] - view.s[0])
     if len(places) < 3:
         return float(view.s[line.column]), 2.0 * pixel

@@ -116,8 +116,8 @@ class LineSettings:
         Height of the pieces that must show it, metres.
     heights
         Between which a door's edge is in any case, above the floor, metres.
-    smoothing
-        Of the gradient, pixels of the view.
+    smoothing, fine_smoothing
+        Of the gradient in the search, and where an edge is measured, pixels of the view.
     min_contrast, noise_factor
         Step of the logarithm of grey that counts in a piece: at least, and in noises of the piece.
     min_coverage, min_pieces
@@ -135,6 +135,7 @@ class LineSettings:
     piece: Positive
     heights: Interval
     smoothing: Positive
+    fine_smoothing: Positive
     min_contrast: Positive
     noise_factor: Positive
     min_coverage: Fraction
@@ -173,6 +174,7 @@ class Calibration(NamedTuple):
     offset: Positive
     slope: Positive
     bend: Positive
+    floor: Positive
 
 
 @dataclass(frozen=True)
@@ -181,9 +183,9 @@ class FitSettings:
 
     Attributes
     ----------
-    pixel_noise, block_noise
+    pixel_noise, block_noise, floor_noise
         Standard deviation of inverse depths, 1/m: of a block of pixels, and of the mean over
-        ``correlation`` pixels, whose errors are alike.
+        ``correlation`` pixels, whose errors are alike; the latter on a floor, which shines.
     correlation
         Pixels.
     margin, frame, beside
@@ -207,6 +209,7 @@ class FitSettings:
 
     pixel_noise: Positive
     block_noise: Positive
+    floor_noise: Positive
     correlation: Positive
     margin: Positive
     frame: Positive

@@ -19,7 +19,7 @@ from kmn_perception.doors.settings import Calibration, FitSettings
 from kmn_perception.doors.wall_view import WallFrame
 
 WALL, PANEL, FLOOR, TILT, OFFSET, WARP = slice(0, 2), slice(2, 4), 4, slice(5, 7), 7, slice(7, 11)
-SIZE = 11
+FLOOR_OFFSET, SIZE = 11, 12
 _TRIALS, _ROUNDS = 150, 5
 _LOW, _HIGH, _PANEL_HIGH = 0.1, 2.4, 1.95  # metres above the floor between which blocks are taken
 _MAX_TURN = 0.6  # radians to the plane that was found
@@ -31,11 +31,12 @@ class Surfaces(NamedTuple):
     Attributes
     ----------
     values
-        (11,) wall (b, c), panel (b, c), 1 / height of the camera, tilts of the vertical to the
+        (12,) wall (b, c), panel (b, c), 1 / height of the camera, tilts of the vertical to the
         right and away (radians), offset of the inverse depths (1/m), and its warp: per metre to the
-        right and down in the image at a depth of 1 m, and per square of the former.
+        right and down in the image at a depth of 1 m, and per square of the former; and a floor's
+        own offset, since it shines.
     covariance
-        (11, 11) of these.
+        (12, 12) of these.
     wall_blocks, panel_blocks
         How many blocks lie on them.
     panel_share
@@ -109,14 +110,14 @@ def fit_surfaces(
     below = valid & (data.up < 0.0) if floor else np.zeros_like(valid)
     start = np.array([*wall, *panel, 1.0 / frame.height, *np.zeros(SIZE - 5)])
     values, covariance, masks = _solve(
-        data, (*regions, below), start, None, calibration, settings
+        data, (*regions, below), start, None, calibration, blocks.size, settings
     )
     if min(masks[0].sum(), masks[1].sum()) < settings.min_blocks:
         return None
     opening = _opening(values, covariance, settings)
     if opening == 0.0:
         values, covariance, masks = _solve(
-            data, (*regions, below), values, settings.closed, calibration, settings
+            data, (*regions, below), values, settings.closed, calibration, blocks.size, settings
         )
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)
@@ -149,7 +150,7 @@ def _opening(
 
 
 def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivatives (11,) of the panel's angle to the wall."""
+    """Return the derivatives (12,) of the panel's angle to the wall."""
     row = np.zeros(SIZE)
     for part, sign in ((PANEL, 1.0), (WALL, -1.0)):
         b, c = values[part]
@@ -184,7 +185,7 @@ def _start(
 def _rows(
     data: _Data, mask: NDArray[np.bool_], part: slice | int, values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the derivatives (N, 11) of the inverse depths of blocks on a surface."""
+    """Return the derivatives (N, 12) of the inverse depths of blocks on a surface."""
     x, y, up = data.x[mask], data.y[mask], data.up[mask]
     rows = np.zeros((len(x), SIZE))
     rows[:, WARP] = data.warp[mask]
@@ -193,6 +194,7 @@ def _rows(
         rows[:, TILT] = -up[:, None] * values[part]
     else:
         rows[:, part] = -up
+        rows[:, FLOOR_OFFSET] = 1.0
         rows[:, TILT] = -values[part] * np.stack([x, y], axis=-1)
     return rows
 
@@ -211,17 +213,20 @@ def _solve(
     start: NDArray[np.float64],
     closed: float | None,
     calibration: Calibration,
+    size: int,
     settings: FitSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.bool_]]]:
     """Return values, covariance, and the blocks that lie on each surface."""
     values = start.copy()
     # So many neighbouring blocks know as much as one of them without noise of its own.
-    weight = 1.0 / settings.block_noise**2 / (settings.correlation / 8.0) ** 2
+    alone = (settings.block_noise, settings.block_noise, settings.floor_noise)
+    weights = [(noise * settings.correlation / size) ** -2.0 for noise in alone]
     reach = settings.inlier * settings.pixel_noise
     prior = np.zeros((SIZE, SIZE))
     slope = calibration.slope
     deviations = np.array([calibration.offset, slope, slope, calibration.bend])
     prior[WARP, WARP] = np.diag(deviations**-2.0)
+    prior[FLOOR_OFFSET, FLOOR_OFFSET] = calibration.floor**-2.0
     prior[TILT, TILT] = np.eye(2) / settings.tilt**2
     masks: list[NDArray[np.bool_]] = []
     for _ in range(_ROUNDS):
@@ -230,7 +235,7 @@ def _solve(
             information[FLOOR, FLOOR] += 1e6  # not observed: stays where it is
             right_side[FLOOR] += 1e6 * start[FLOOR]
         masks = []
-        for part, region in zip((WALL, PANEL, FLOOR), regions, strict=True):
+        for part, region, weight in zip((WALL, PANEL, FLOOR), regions, weights, strict=True):
             mask = region & (np.abs(_predict(values, data, part) - data.inverse) < reach)
             rows = _rows(data, mask, part, values)
             information += weight * rows.T @ rows

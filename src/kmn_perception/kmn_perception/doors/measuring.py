@@ -26,7 +26,7 @@ from kmn_perception.doors.wall_view import WallFrame, WallView
 if TYPE_CHECKING:
     from kmn_perception.doors.door_finder import Frame
 
-_VISIBLE_REVEAL = (0.25, 0.35)  # where frame's and panel's edge are both seen: which one is it
+_VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
 

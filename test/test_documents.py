@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from kmn_perception.configuration.node_parameters import parameter_table
+from kmn_perception.rooms.sampling import KINDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -31,3 +32,9 @@ def test_every_executable_stands_there(page: str) -> None:
     table = runpy.run_path(str(ROOT / f"src/{package}/{package}/executables.py"))["EXECUTABLES"]
     text = (ROOT / page).read_text(encoding="utf-8")
     assert set(table) <= set(re.findall(r"^\| `(\w+)", text, flags=re.MULTILINE))
+
+
+def test_every_kind_of_room_stands_there() -> None:
+    text = (ROOT / "docs/rooms.md").read_text(encoding="utf-8")
+    rows = "".join(re.findall(r"^\| (`.*?) \|", text, flags=re.MULTILINE))
+    assert set(re.findall(r"`(\w+)`", rows)) == set(KINDS)

@@ -17,6 +17,7 @@ TIERS = {
         ("configuration",),
         ("command_line", "model"),
         ("scene", "network", "refinement", "rooms"),
+        ("doors",),
         ("estimator",),
         ("pipeline",),
         ("training", "visualization"),

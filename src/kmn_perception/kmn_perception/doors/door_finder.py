@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -70,9 +71,9 @@ class DoorFinder:
         if frame.grey is not None:
             segments = line_segments(frame.grey, frame.camera, settings.vertical)
         up = find_up(planes, segments, settings.vertical)
-        floor = self._camera_height(blocks, up)
-        height = settings.prior.handle_height[0] if floor is None else floor
         walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
+        floor = self._camera_height(blocks, up, walls)
+        height = settings.prior.handle_height[0] if floor is None else floor
         if not walls:
             return DoorEstimate.none("no wall is seen")
         candidates = [
@@ -94,12 +95,19 @@ class DoorFinder:
                 found.append(judge(measurement, settings))
         return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
 
-    def _camera_height(self, blocks: Blocks, up: NDArray[np.float64]) -> float | None:
+    def _camera_height(
+        self, blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane]
+    ) -> float | None:
         settings = self.settings.floor
         rays, inverse, valid = blocks.flat()
+        level = np.ones_like(valid)
+        for wall in walls:
+            reach = self.settings.planes.inlier * self.settings.fit.pixel_noise
+            level &= np.abs(rays @ wall.vector - inverse) > reach
         return find_camera_height(
             rays[valid] @ up,
             inverse[valid],
+            level[valid],
             self.settings.fit.pixel_noise,
             settings.heights,
             settings.min_blocks,

@@ -203,6 +203,8 @@ class FitSettings:
         Standard deviation of the vertical, radians.
     closed
         Standard deviation of a closed panel's angle to its wall, radians.
+    agree
+        Standard deviations of that angle within which wall and panel are taken to be parallel.
     ajar
         Angle to the wall from which a door is open, radians, and in standard deviations.
     min_blocks
@@ -222,6 +224,7 @@ class FitSettings:
     inlier: Positive
     tilt: Positive
     closed: Positive
+    agree: Positive
     ajar: tuple[float, float]
     min_blocks: Count
     edge_noise: Positive

@@ -127,8 +127,8 @@ class DoorFinder:
         pieces = cut_to_pieces(view, before, behind, settings.lines)
         lines = find_lines(pieces, settings.lines)
         candidates = find_candidates(view, pieces, lines, settings)
-        if self.network is None:
-            return candidates
+        if self.network is None or view.grey is None:
+            return candidates  # it was trained on images, and knows little of depth alone
         return with_proposals(candidates, view, pieces, lines, self.network, settings)
 
     def _best(self, found: list[DoorEstimate]) -> DoorEstimate:

@@ -313,6 +313,8 @@ class VerdictSettings:
         Share of the panel's unhidden measurements that lie on it.
     min_visible
         Share of the panel that must be in view and unhidden.
+    min_confidence
+        Probability of its edges, by the network, that makes a door without recess and handle.
     max_edge_deviation
         Of an edge whose place is known, metres.
     rival
@@ -325,6 +327,7 @@ class VerdictSettings:
     min_step: Positive
     min_panel: Fraction
     min_visible: Fraction
+    min_confidence: Fraction
     max_edge_deviation: Positive
     rival: NonNegative
 

@@ -12,6 +12,8 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
 
+_UNLIKELY = 0.02  # of the network's probability of the edges
+
 
 def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     """Return the estimate of a measured candidate, with what it is worth."""
@@ -19,8 +21,10 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     handle = found.handle if _is_on_panel(found, settings) else None
     if reason:
         status = DoorStatus.NO_DOOR
-    elif (doubt := _doubt(found, settings)):
+    elif doubt := _doubt(found, settings):
         status, reason = DoorStatus.AMBIGUOUS, doubt
+    elif handle is None and not _is_door_without_handle(found, settings):
+        status, reason = DoorStatus.NO_DOOR, "a flat rectangle without a handle may be anything"
     elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
         reason = "no handle is seen; it is sought " + _where(found)
@@ -106,6 +110,16 @@ def _doubt(found: Measurement, settings: DoorSettings) -> str:
         if deviation > settings.verdict.max_edge_deviation:
             return f"several lines may be the {side} edge: it is known to {1e3 * deviation:.0f} mm"
     return ""
+
+
+def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
+    """Return whether recess, opening or the network tell a door from a poster or a cupboard."""
+    confidence = found.candidate.confidence
+    if confidence >= settings.verdict.min_confidence:
+        return True
+    recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+    deep = recess > settings.verdict.min_step * deviation
+    return found.surfaces.opening != 0.0 or bool(deep and not confidence < _UNLIKELY)
 
 
 def _is_edge(line: Line, settings: DoorSettings) -> bool:

@@ -1,4 +1,4 @@
-"""From a frame to the door in it: planes, the vertical, walls, edges, handle, one fit, a verdict."""
+"""From a frame to the door in it: planes, the vertical, walls, edges, one fit, a verdict."""
 
 from __future__ import annotations
 

@@ -75,9 +75,7 @@ def measure(
         for (direction, deviation), spread in zip(edges, spreads, strict=True)
     ]
     directions = edges[0][0], edges[1][0]
-    surfaces = fit_surfaces(
-        blocks, at, directions, floor, settings.calibration, settings.fit
-    )
+    surfaces = fit_surfaces(blocks, at, directions, floor, settings.calibration, settings.fit)
     if surfaces is None:
         return None
     heights = _lintel_heights(at, directions, surfaces, settings)
@@ -97,8 +95,16 @@ def measure(
     )
     shape = door_shape(measured, handle_left, ajar)
     return Measurement(
-        candidate, surfaces, lintel, handle, shape, values, spread, float(measured[4]),
-        (edges[0][1] * at.distance, edges[1][1] * at.distance), floor
+        candidate,
+        surfaces,
+        lintel,
+        handle,
+        shape,
+        values,
+        spread,
+        float(measured[4]),
+        (edges[0][1] * at.distance, edges[1][1] * at.distance),
+        floor,
     )
 
 
@@ -232,10 +238,8 @@ def _gather(
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         recess.append(depth)
         outward = direction < 0.0 if i == 0 else direction > 0.0
-        if depth < 0.0:
-            told = _PROUD
-        else:
-            told = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        told = _PROUD if depth < 0.0 else reveal
         values[7 + i], deviations[7 + i] = told
     middle = 0.5 * (edges[0][0] + edges[1][0])
     expected = settings.prior.handle_height

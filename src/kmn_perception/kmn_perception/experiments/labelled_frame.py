@@ -51,8 +51,9 @@ def check_frames(frames: Sequence[LabelledFrame], settings: ExperimentSettings) 
     for frame in frames:
         if frame.depth.shape != (camera.height, camera.width):
             raise FrameError(
-                f"{frame.name}: {size_text(frame.depth.shape)} pixels, expected the {camera.width} x "
-                f"{camera.height} of the experiment's camera (config/experiments.yaml)"
+                f"{frame.name}: {size_text(frame.depth.shape)} pixels, expected the "
+                f"{camera.width} x {camera.height} of the experiment's camera "
+                "(config/experiments.yaml)"
             )
         table = int(((frame.labels == TABLE) & np.isfinite(frame.depth)).sum())
         if table < settings.min_table:
@@ -90,8 +91,8 @@ def _read_frame(file: Path) -> LabelledFrame:
         raise FrameError(str(error)) from error
     if labels.shape != depth.shape:
         raise FrameError(
-            f"{name}: labels of {size_text(labels.shape)} pixels for a depth image of {size_text(depth.shape)}; "
-            "expected the same size"
+            f"{name}: labels of {size_text(labels.shape)} pixels for a depth image of "
+            f"{size_text(depth.shape)}; expected the same size"
         )
     return LabelledFrame(name, depth, labels)
 

@@ -146,13 +146,10 @@ def compare(found: DoorPlace, label: DoorLabel) -> NDArray[np.float64]:
     handle = found.handle - (nothing if label.handle is None else label.handle)
     opening = abs(found.opening) - (label.opening.value if label.opening else np.nan)
     is_closed = found.opening == 0.0 and label.opening is not None and label.opening.value == 0.0
-    edges = (
-        _across(found.left, label.edges[0], label),
-        _across(found.right, label.edges[1], label),
-    )
+    sides = zip((found.left, found.right), label.edges, strict=True)
     return np.array(
         [
-            *(MM * edge for edge in edges),
+            *(MM * _across(ends, edge, label) for ends, edge in sides),
             MM * offset,
             np.degrees(np.arcsin(np.clip(turn, -1.0, 1.0))),
             MM * (found.width - (label.width.value if label.width else np.nan)),

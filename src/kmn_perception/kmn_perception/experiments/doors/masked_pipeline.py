@@ -1,4 +1,4 @@
-"""The pipeline for single objects, helped by hand: mask, camera pose and handle's side are given."""
+"""The pipeline for single objects, given mask, camera pose and handle's side by hand."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ COLOURS = {
     DoorStatus.AMBIGUOUS: (60, 96, 240),
     DoorStatus.NO_DOOR: (60, 96, 240),
 }
-WHITE, WRONG = (255, 255, 255), (255, 0, 255)
+WHITE, BLACK, WRONG = (255, 255, 255), (0, 0, 0), (255, 0, 255)
 SCALE = 2  # of the picture
 SHIFT = 4  # bits of the fractions of a pixel in which OpenCV draws
 COLUMNS, WIDTH = 4, 480  # of the overview: pictures in a row, and pixels of each
@@ -46,7 +46,8 @@ def save_pictures(pictures: Iterable[tuple[str, Picture]], folder: Path) -> Path
     for name, picture in pictures:
         _write(folder / f"{name}.png", picture)
         height = round(WIDTH * picture.shape[0] / picture.shape[1])
-        small.append(cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA))
+        resized = cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA)
+        small.append(np.asarray(resized, dtype=np.uint8))
     sheet = folder / "all_frames.png"
     _write(sheet, _side_by_side(small))
     return sheet
@@ -67,6 +68,13 @@ def _draw(result: DoorResult) -> Picture:
     frame, estimate = result.frame, result.estimates[WITH_COLOUR]
     picture = _background(frame)
     camera = replace(frame.description.camera, pose=np.eye(4))
+    wrong = result.outcomes[WITH_COLOUR].wrong
+    colour = WRONG if wrong else COLOURS[estimate.status]
+    if np.isfinite(estimate.corners).all():
+        for a, b in EDGES:
+            _line(picture, camera, estimate.corners[a], estimate.corners[b], colour, 3)
+        if estimate.handle_side:
+            _circle(picture, camera, estimate.handle, colour, 3)
     label = frame.label
     if label is not None:
         for edge in label.edges:
@@ -74,17 +82,10 @@ def _draw(result: DoorResult) -> Picture:
                 _line(picture, camera, edge.top, edge.bottom, WHITE, 1)
         if label.handle is not None:
             _circle(picture, camera, label.handle, WHITE, 1)
-    wrong = result.outcomes[WITH_COLOUR].wrong
-    colour = WRONG if wrong else COLOURS[estimate.status]
-    if np.isfinite(estimate.corners).all():
-        for a, b in EDGES:
-            _line(picture, camera, estimate.corners[a], estimate.corners[b], colour, 2)
-        if estimate.handle_side:
-            _circle(picture, camera, estimate.handle, colour, 2)
     title = f"{frame.name}: {estimate.status.value}{', wrong' if wrong else ''}"
-    for thickness, ink in ((5, (0, 0, 0)), (2, colour)):
+    for thickness, ink in ((9, BLACK), (3, colour)):
         cv2.putText(
-            picture, title, (12, 34), cv2.FONT_HERSHEY_SIMPLEX, 0.9, ink, thickness, cv2.LINE_AA
+            picture, title, (14, 54), cv2.FONT_HERSHEY_SIMPLEX, 1.6, ink, thickness, cv2.LINE_AA
         )
     return picture
 

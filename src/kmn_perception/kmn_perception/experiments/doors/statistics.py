@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from statistics import NormalDist
 from typing import Any
 
@@ -39,7 +39,7 @@ def statistics(results: Sequence[DoorResult], settings: ExperimentSettings) -> S
     return {
         **by_mode[WITH_COLOUR],
         "baselines": {
-            name: _of_baseline(results, lambda result, name=name: result.baselines[name])
+            name: _of_baseline(results, [result.baselines[name] for result in results])
             for name in (results[0].baselines if results else ())
         },
         DEPTH_ALONE: by_mode[DEPTH_ALONE],
@@ -62,10 +62,7 @@ def _of_mode(results: Sequence[DoorResult], mode: str, settings: ExperimentSetti
     }
 
 
-def _of_baseline(
-    results: Sequence[DoorResult], outcome_of: Callable[[DoorResult], Outcome]
-) -> Statistics:
-    outcomes = [outcome_of(result) for result in results]
+def _of_baseline(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> Statistics:
     off = [outcome.errors for outcome in outcomes if outcome.errors]
     return {**_counts(results, outcomes), **{key: _sizes(off, key) for key in BASELINE_ERRORS}}
 

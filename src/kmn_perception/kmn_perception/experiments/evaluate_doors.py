@@ -15,7 +15,7 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.experiments.doors.experiment import MODES, DoorExperiment
 from kmn_perception.experiments.doors.frames import DEPTHS, find_frames
 from kmn_perception.experiments.doors.label import describe_camera
-from kmn_perception.experiments.doors.pictures import draw, save_pictures
+from kmn_perception.experiments.doors.pictures import Pictures
 from kmn_perception.experiments.doors.statistics import statistics
 from kmn_perception.experiments.doors.tables import frame_table, in_view, method_table
 from kmn_perception.experiments.labelled_frame import FrameError
@@ -63,13 +63,18 @@ def _report(options: argparse.Namespace) -> None:
     without_json = describe_camera(options.camera or settings.doors.camera)
     frames = find_frames(options.folder, options.depth, without_json)
     experiment = DoorExperiment(settings, DoorSettings.load())
-    results = list(tqdm(experiment.run(frames), "frames", len(frames), unit="frame"))
+    pictures = Pictures(options.out) if options.out else None
+    results = []
+    for files in tqdm(frames, "frames", unit="frame"):
+        frame = files.read()
+        results.append(experiment.run(frame))
+        if pictures:
+            pictures.add(frame, results[-1])
     summary = statistics(results, settings)
     for mode in MODES:
         print(frame_table(results, mode), end="\n\n")
     print(method_table(summary), in_view(results), sep="\n\n")
-    if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
-        print(f"pictures: {save_pictures(draw(results), options.out)}")
+    if pictures:
+        print(f"pictures: {pictures.save_all()}")
     if options.json:
         write_json(options.json, summary)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,7 +13,8 @@ from kmn_perception.doors.door_finder import DoorFinder, Frame
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.experiments.doors.baselines import BASELINES
 from kmn_perception.experiments.doors.errors import DoorErrors, DoorPlace, compare, errors
-from kmn_perception.experiments.doors.frames import DoorFrame, FrameFiles
+from kmn_perception.experiments.doors.frames import DoorFrame
+from kmn_perception.experiments.doors.label import DoorLabel
 from kmn_perception.experiments.doors.masked_pipeline import masked_pipeline
 from kmn_perception.experiments.experiment import load_pipeline
 from kmn_perception.experiments.settings import ExperimentSettings
@@ -49,13 +49,16 @@ class DoorResult(NamedTuple):
 
     Attributes
     ----------
+    name, label
+        Of the frame.
     estimates, outcomes, seconds
         By mode; the seconds are those of one core, the minimum of some repetitions.
     baselines
         By name.
     """
 
-    frame: DoorFrame
+    name: str
+    label: DoorLabel | None
     estimates: dict[str, DoorEstimate]
     outcomes: dict[str, Outcome]
     seconds: dict[str, float]
@@ -76,12 +79,8 @@ class DoorExperiment:
         self.model = RoomModel.load(MODEL)
         self.pipeline = load_pipeline()
 
-    def run(self, frames: Sequence[FrameFiles]) -> Iterator[DoorResult]:
-        """Yield the result of each frame; raise `FrameError` at one that cannot be read."""
-        for files in frames:
-            yield self._run(files.read())
-
-    def _run(self, frame: DoorFrame) -> DoorResult:
+    def run(self, frame: DoorFrame) -> DoorResult:
+        """Return the result of a frame."""
         doors = self.doors
         if frame.delivered:
             doors = replace(doors, calibration=doors.delivered)
@@ -95,7 +94,8 @@ class DoorExperiment:
         places = {name: find(seen[WITH_COLOUR], doors) for name, find in BASELINES.items()}
         places[MASKED] = masked_pipeline(frame, self.pipeline, self.model)
         return DoorResult(
-            frame,
+            frame.name,
+            frame.label,
             estimates,
             {mode: self._judge(estimate, frame) for mode, estimate in estimates.items()},
             {mode: seconds for mode, (_, seconds) in found.items()},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,28 +29,32 @@ COLOURS = {
 WHITE, BLACK, WRONG = (255, 255, 255), (0, 0, 0), (255, 0, 255)
 SCALE = 2  # of the picture
 SHIFT = 4  # bits of the fractions of a pixel in which OpenCV draws
-COLUMNS, WIDTH = 4, 480  # of the overview: pictures in a row, and pixels of each
+COLUMNS, WIDTH = 6, 320  # of the overview: pictures in a row, and pixels of each
 RADIUS = 0.03  # of the circle at a handle, metres
 EDGES = ((0, 1), (0, 2), (1, 3), (2, 3))  # of the corners of an estimate
 
 
-def draw(results: Iterable[DoorResult]) -> Iterator[tuple[str, Picture]]:
-    """Yield name and picture of each frame, with the estimate from depth and colour."""
-    for result in results:
-        yield result.frame.name, _draw(result)
+class Pictures:
+    """Writes a picture for each frame into a folder, which is made, and one of all."""
 
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._small: list[Picture] = []
+        folder.mkdir(parents=True, exist_ok=True)
 
-def save_pictures(pictures: Iterable[tuple[str, Picture]], folder: Path) -> Path:
-    """Write a picture for each frame, and one of all; return the latter's path."""
-    small = []
-    for name, picture in pictures:
-        _write(folder / f"{name}.png", picture)
+    def add(self, frame: DoorFrame, result: DoorResult) -> None:
+        """Write the picture of a frame, with the estimate from depth and colour."""
+        picture = _draw(frame, result)
+        _write(self.folder / f"{frame.name}.png", picture)
         height = round(WIDTH * picture.shape[0] / picture.shape[1])
         resized = cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA)
-        small.append(np.asarray(resized, dtype=np.uint8))
-    sheet = folder / "all_frames.png"
-    _write(sheet, _side_by_side(small))
-    return sheet
+        self._small.append(np.asarray(resized, dtype=np.uint8))
+
+    def save_all(self) -> Path:
+        """Write the picture of all frames, and return its path."""
+        sheet = self.folder / "all_frames.png"
+        _write(sheet, _side_by_side(self._small))
+        return sheet
 
 
 def _side_by_side(pictures: Sequence[Picture]) -> Picture:
@@ -64,8 +68,8 @@ def _side_by_side(pictures: Sequence[Picture]) -> Picture:
     return sheet
 
 
-def _draw(result: DoorResult) -> Picture:
-    frame, estimate = result.frame, result.estimates[WITH_COLOUR]
+def _draw(frame: DoorFrame, result: DoorResult) -> Picture:
+    estimate = result.estimates[WITH_COLOUR]
     picture = _background(frame)
     camera = replace(frame.description.camera, pose=np.eye(4))
     wrong = result.outcomes[WITH_COLOUR].wrong

@@ -43,7 +43,7 @@ def statistics(results: Sequence[DoorResult], settings: ExperimentSettings) -> S
             for name in (results[0].baselines if results else ())
         },
         DEPTH_ALONE: by_mode[DEPTH_ALONE],
-        "per_frame": {result.frame.name: _of_frame(result) for result in results},
+        "per_frame": {result.name: _of_frame(result) for result in results},
     }
 
 
@@ -69,7 +69,7 @@ def _of_baseline(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> 
 
 def _counts(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> Statistics:
     """Return how many frames there are, and of which a door is found, rightly or not."""
-    is_there = [result.frame.label is not None for result in results]
+    is_there = [result.label is not None for result in results]
     found = [outcome.found for outcome in outcomes]
     return {
         "frames": len(results),
@@ -89,7 +89,7 @@ def _sizes(off: Sequence[DoorErrors], key: str) -> dict[str, float | None]:
 
 
 def _of_frame(result: DoorResult) -> dict[str, Any]:
-    label = result.frame.label
+    label = result.label
     truth: dict[str, Any] = {"door": label is not None}
     if label is not None:
         truth |= {

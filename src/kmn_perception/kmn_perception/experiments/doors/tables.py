@@ -41,9 +41,9 @@ def _row(result: DoorResult, mode: str) -> list[str]:
         ratios = np.nan_to_num(outcome.errors.ratios)
         worst = f"{ratios.max():.1f} {order[int(ratios.argmax())]}"
     status = estimate.status.value + (" AND WRONG" if outcome.wrong else "")
-    what = "" if result.frame.label is not None else "no door there"
+    what = "" if result.label is not None else "no door there"
     return [
-        result.frame.name, status, *cells, worst, what, f"{1e3 * result.seconds[mode]:.0f}",
+        result.name, status, *cells, worst, what, f"{1e3 * result.seconds[mode]:.0f}",
     ]  # fmt: skip
 
 
@@ -76,7 +76,7 @@ def _pair(value: dict[str, Any] | None, digits: int) -> str:
 
 def in_view(results: Sequence[DoorResult]) -> str:
     """Return in words how many of the doors are found that have both edges in view."""
-    seen = [r for r in results if r.frame.label is not None and r.frame.label.edges_in_view]
+    seen = [r for r in results if r.label is not None and r.label.edges_in_view]
     found = {mode: sum(r.outcomes[mode].found for r in seen) for mode in NAMES}
     counts = ", ".join(f"{n} with {NAMES[mode]}" for mode, n in found.items())
     return f"Of {len(seen)} doors with both edges in view there are found: {counts}"

@@ -16,7 +16,7 @@ TIERS = {
     "kmn_perception": (
         ("configuration",),
         ("command_line", "model"),
-        ("scene", "network", "refinement", "rooms"),
+        ("scene", "network", "refinement", "rooms", "doors"),
         ("estimator",),
         ("pipeline",),
         ("training", "visualization"),

@@ -69,7 +69,8 @@ class DoorErrors(NamedTuple):
     @property
     def ratios(self) -> NDArray[np.float64]:
         """(Q,) errors in deviations, without their signs."""
-        return np.abs(self.values) / self.deviations
+        with np.errstate(divide="ignore", invalid="ignore"):  # what is stated to be exact
+            return np.abs(self.values) / self.deviations
 
     def is_wrong(self, settings: DoorExperimentSettings) -> bool:
         """Return whether a promise is broken, or the door is not where it is said to be."""

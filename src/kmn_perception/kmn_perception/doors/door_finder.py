@@ -79,11 +79,15 @@ class DoorFinder:
         if not candidates:
             return DoorEstimate.none(_no_edges(frame))
         candidates.sort(key=lambda candidate: -candidate.score)
-        found = [
-            judge(measurement, settings)
-            for candidate in candidates[: settings.candidates]
-            if (measurement := measure(frame, blocks, candidate, floor is not None, settings))
-        ]
+        found: list[DoorEstimate] = []
+        bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
+        for candidate in candidates[: settings.candidates]:
+            best = max((door.score for door in found if door.found), default=-np.inf)
+            if candidate.score + bonus < best:
+                break  # neither this nor a later one can be as good
+            measurement = measure(frame, blocks, candidate, floor is not None, settings)
+            if measurement is not None:
+                found.append(judge(measurement, settings))
         return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
 
     def _camera_height(self, blocks: Blocks, up: NDArray[np.float64]) -> float | None:

@@ -16,7 +16,8 @@ TIERS = {
     "kmn_perception": (
         ("configuration",),
         ("command_line", "model"),
-        ("scene", "network", "refinement", "rooms", "doors"),
+        ("scene", "network", "refinement", "rooms"),
+        ("doors",),
         ("estimator",),
         ("pipeline",),
         ("training", "visualization"),

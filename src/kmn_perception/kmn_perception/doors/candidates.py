@@ -10,16 +10,28 @@ import numpy as np
 from kmn_perception.doors.lines import Line, Pieces
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
+from kmn_perception.network.wall_network import Proposals
 
 
 class Candidate(NamedTuple):
-    """Two edges of a view, and a score; the larger, the more it looks like a door."""
+    """Two edges of a view.
+
+    Attributes
+    ----------
+    score
+        The larger, the more it looks like a door.
+    confidence, proposals
+        The network's probability of these edges, and what else it proposes; NaN and None without a
+        network.
+    """
 
     score: float
     view: WallView
     pieces: Pieces
     left: Line
     right: Line
+    confidence: float = np.nan
+    proposals: Proposals | None = None
 
     @property
     def directions(self) -> tuple[float, float]:
@@ -40,7 +52,7 @@ def find_candidates(
         for right in lines[i + 1 :]:
             width = (right.column - left.column) * pixel
             if narrow - slack <= width <= wide + slack:
-                score = _score(left, right, width, lines, pieces, pixel, settings)
+                score = score_of(left, right, width, lines, pieces, pixel, settings)
                 found.append(Candidate(score, view, pieces, left, right))
     found.sort(key=lambda candidate: -candidate.score)
     return _distinct(found, slack / pixel)[: settings.candidates]
@@ -69,7 +81,7 @@ def _clarity(candidate: Candidate) -> float:
     return sum(min(line.contrast, 1.0) + 0.05 * abs(line.step) for line in lines) * (1 + opposite)
 
 
-def _score(
+def score_of(
     left: Line,
     right: Line,
     width: float,

@@ -162,6 +162,7 @@ class ScoreSettings(NamedTuple):
     handle: float
     lintel: float
     no_lintel: float
+    network: float
 
 
 class Calibration(NamedTuple):
@@ -300,6 +301,24 @@ class VerdictSettings:
     rival: NonNegative
 
 
+class NetworkSettings(NamedTuple):
+    """How the network's proposals are taken.
+
+    Attributes
+    ----------
+    peaks
+        Of each edge's probability that are looked at.
+    min_confidence
+        Of a pair of edges that is measured at all.
+    snap
+        Distance within which an edge of the view is the one that is meant, metres.
+    """
+
+    peaks: Count
+    min_confidence: Fraction
+    snap: Positive
+
+
 class PriorSettings(NamedTuple):
     """What is known of doors where the view does not show it: value and deviation, metres."""
 
@@ -322,6 +341,7 @@ class DoorSettings:
     handle: HandleSettings
     lintel: LintelSettings
     verdict: VerdictSettings
+    network: NetworkSettings
     prior: PriorSettings
     candidates: Count
     calibration: Calibration

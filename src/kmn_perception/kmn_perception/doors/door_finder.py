@@ -14,11 +14,13 @@ from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.planes import Plane, find_planes
+from kmn_perception.doors.proposals import with_proposals
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.wall_view import WallFrame, view_wall
 from kmn_perception.model.camera import Camera
+from kmn_perception.network.wall_network import WallNetwork
 
 _MAX_WALLS = 3
 
@@ -46,12 +48,14 @@ class DoorFinder:
 
     Attributes
     ----------
-    settings
-        May be replaced between two frames.
+    settings, network
+        May be replaced between two frames; without a network edges alone propose.
     """
 
-    def __init__(self, settings: DoorSettings, seed: int = 0) -> None:
-        self.settings, self.seed = settings, seed
+    def __init__(
+        self, settings: DoorSettings, network: WallNetwork | None = None, seed: int = 0
+    ) -> None:
+        self.settings, self.network, self.seed = settings, network, seed
 
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""
@@ -113,7 +117,11 @@ class DoorFinder:
             return []
         before, behind = settings.view.before * noise, settings.view.behind * noise
         pieces = cut_to_pieces(view, before, behind, settings.lines)
-        return find_candidates(view, pieces, find_lines(pieces, settings.lines), settings)
+        lines = find_lines(pieces, settings.lines)
+        candidates = find_candidates(view, pieces, lines, settings)
+        if self.network is None:
+            return candidates
+        return with_proposals(candidates, view, pieces, lines, self.network, settings)
 
     def _best(self, found: list[DoorEstimate]) -> DoorEstimate:
         """Return the door that most speaks for, unless another one is as likely."""

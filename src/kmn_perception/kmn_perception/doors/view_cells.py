@@ -57,6 +57,11 @@ def cell_of(view: WallView, column: float) -> float:
     return (column - 0.5 * (_WIDE - 1)) / _WIDE
 
 
+def row_of(view: WallView, row: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the cell's row of rows of the view."""
+    return (row - 0.5 * (_HIGH - 1)) / _HIGH
+
+
 def height_of(view: WallView, row: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the height above the floor of the middle of a cell's row, metres."""
     pixel = float(view.z[0] - view.z[1])

@@ -206,7 +206,7 @@ class PriorSettings(NamedTuple):
 
 @dataclass(frozen=True)
 class DoorSettings:
-    """All of the above, and the sensor's calibration."""
+    """All of the above, and the sensor's calibration: the user's, and as it is ``delivered``."""
 
     planes: PlaneSettings
     vertical: VerticalSettings
@@ -222,6 +222,7 @@ class DoorSettings:
     prior: PriorSettings
     candidates: Count
     calibration: Calibration
+    delivered: Calibration
 
     @classmethod
     def load(cls) -> DoorSettings:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.camera_check import doubt_upright, find_contradiction
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.inverse_depth import Blocks
@@ -34,11 +35,16 @@ class Frame(NamedTuple):
         (height, width) 0 to 1, of the same pixels; None without an image.
     camera
         Their pinhole camera; its pose is not used.
+    up, height
+        What is known of the camera: the upward unit vector (3,) in the optical frame, and its
+        height above the floor, metres. What is not given is found in the frame.
     """
 
     depth: NDArray[np.float32]
     grey: NDArray[np.float32] | None
     camera: Camera
+    up: NDArray[np.float64] | None = None
+    height: float | None = None
 
 
 class DoorFinder:
@@ -62,11 +68,12 @@ class DoorFinder:
         planes = find_planes(blocks, noise, settings.planes, generator)
         if not planes:
             return DoorEstimate.none("no plane is seen")
-        segments = None
-        if frame.grey is not None:
-            segments = line_segments(frame.grey, frame.camera, settings.vertical)
-        up = find_up(planes, segments, settings.vertical)
-        floor = self._camera_height(blocks, up)
+        up = self._up(frame, planes)
+        if frame.up is not None:
+            wrong = find_contradiction(planes, up, frame.height, settings)
+            if wrong:
+                return DoorEstimate.none(wrong)
+        floor = self._camera_height(blocks, up) if frame.height is None else frame.height
         height = settings.prior.handle_height[0] if floor is None else floor
         walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
         if not walls:
@@ -84,7 +91,23 @@ class DoorFinder:
             for candidate in candidates[: settings.candidates]
             if (measurement := measure(frame, blocks, candidate, floor is not None, settings))
         ]
-        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
+        if not found:
+            return DoorEstimate.none("no wall beside a panel is seen")
+        best = self._best(found)
+        if frame.up is None and best.found:
+            doubt = doubt_upright(best, planes, up, settings)
+            if doubt:
+                return DoorEstimate.none(doubt)
+        return best
+
+    def _up(self, frame: Frame, planes: list[Plane]) -> NDArray[np.float64]:
+        """Return the upward vector (3,) as it is given, or as the frame shows it."""
+        if frame.up is not None:
+            return frame.up
+        segments = None
+        if frame.grey is not None:
+            segments = line_segments(frame.grey, frame.camera, self.settings.vertical)
+        return find_up(planes, segments, self.settings.vertical)
 
     def _camera_height(self, blocks: Blocks, up: NDArray[np.float64]) -> float | None:
         settings = self.settings.floor

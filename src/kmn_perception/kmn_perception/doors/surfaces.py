@@ -231,9 +231,6 @@ def _solve(
     masks: list[NDArray[np.bool_]] = []
     for _ in range(_ROUNDS):
         information, right_side = prior.copy(), np.zeros(SIZE)
-        if not regions[2].any():
-            information[FLOOR, FLOOR] += 1e6  # not observed: stays where it is
-            right_side[FLOOR] += 1e6 * start[FLOOR]
         masks = []
         for part, region, weight in zip((WALL, PANEL, FLOOR), regions, weights, strict=True):
             mask = region & (np.abs(_predict(values, data, part) - data.inverse) < reach)
@@ -241,6 +238,9 @@ def _solve(
             information += weight * rows.T @ rows
             right_side += weight * rows.T @ data.inverse[mask]
             masks.append(mask)
+        if not masks[2].any():
+            information[FLOOR, FLOOR] += 1e6  # not observed: stays where it is
+            right_side[FLOOR] += 1e6 * start[FLOOR]
         if closed is not None:
             row = _turn_row(values)
             turn = angle(values[PANEL]) - angle(values[WALL])

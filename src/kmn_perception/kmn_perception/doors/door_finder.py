@@ -86,19 +86,20 @@ class DoorFinder:
         if not candidates:
             return DoorEstimate.none(_no_edges(frame))
         candidates.sort(key=lambda candidate: -candidate.score)
-        found = [
-            judge(measurement, settings)
-            for candidate in candidates[: settings.candidates]
-            if (measurement := measure(frame, blocks, candidate, floor is not None, settings))
-        ]
+        found: list[DoorEstimate] = []
+        bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
+        for candidate in candidates[: settings.candidates]:
+            bar = max((door.score for door in found if door.found), default=-np.inf)
+            if candidate.score + bonus < bar:
+                break  # neither this nor a later one can be as good
+            measurement = measure(frame, blocks, candidate, floor is not None, settings)
+            if measurement is not None:
+                found.append(judge(measurement, settings))
         if not found:
             return DoorEstimate.none("no wall beside a panel is seen")
         best = self._best(found)
-        if frame.up is None and best.found:
-            doubt = doubt_upright(best, planes, up, settings)
-            if doubt:
-                return DoorEstimate.none(doubt)
-        return best
+        doubt = doubt_upright(best, planes, up, settings) if frame.up is None and best.found else ""
+        return DoorEstimate.none(doubt) if doubt else best
 
     def _up(self, frame: Frame, planes: list[Plane]) -> NDArray[np.float64]:
         """Return the upward vector (3,) as it is given, or as the frame shows it."""

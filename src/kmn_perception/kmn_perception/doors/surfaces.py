@@ -9,6 +9,7 @@ wall and panel should be parallel. All of this is linear.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,9 @@ FLOOR_OFFSET, SIZE = 11, 12
 _TRIALS, _ROUNDS = 150, 5
 _LOW, _HIGH, _PANEL_HIGH = 0.1, 2.4, 1.95  # metres above the floor between which blocks are taken
 _MAX_TURN = 0.6  # radians to the plane that was found
+_MIN_AREA = 0.02  # of two rays seen from above; nearer ones tell no line
+_CHECKED = 400  # blocks on which lines are compared, about
+_FIRM = 1e6  # information that holds a value where it is
 
 
 class Surfaces(NamedTuple):
@@ -56,14 +60,37 @@ class Surfaces(NamedTuple):
     opening: float
 
 
-class _Data(NamedTuple):
-    """Blocks: rays in the wall's axes, right, away, up (N,); warp (N, 4); inverse depths (N,)."""
+class _Seen(NamedTuple):
+    """Blocks that may lie on a surface.
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    up: NDArray[np.float64]
-    warp: NDArray[np.float64]
+    Attributes
+    ----------
+    part
+        Of the values: which surface.
+    rays
+        (N, 3) in the wall's axes: to the right, away, up.
+    rows
+        (N, 12) derivatives of the inverse depths, but for those of the tilt.
+    inverse
+        (N,) inverse depths, 1/m.
+    noise
+        Standard deviation that the mean of a block has for its neighbours' errors, 1/m.
+    """
+
+    part: slice | int
+    rays: NDArray[np.float64]
+    rows: NDArray[np.float64]
     inverse: NDArray[np.float64]
+    noise: float
+
+    def derivatives(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives (N, 12) of the inverse depths at values (12,)."""
+        rows = self.rows.copy()
+        if isinstance(self.part, slice):
+            rows[:, TILT] = -self.rays[:, 2:] * values[self.part]
+        else:
+            rows[:, TILT] = -values[self.part] * self.rays[:, :2]
+        return rows
 
 
 def fit_surfaces(
@@ -86,13 +113,11 @@ def fit_surfaces(
         Of the sensor.
     """
     rays, inverse, valid = blocks.flat()
-    u, v = rays[:, 0], rays[:, 1]
-    warp = np.stack([np.ones_like(u), u, v, u * u], axis=-1)
-    data = _Data(rays @ frame.right, -rays @ frame.normal, rays @ frame.up, warp, inverse)
-    ahead = data.y > 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        side = np.where(ahead, data.x / data.y, np.inf) * frame.distance
-        height = np.where(ahead, data.up / data.y, np.inf) * frame.distance + frame.height
+    axes = rays @ np.stack([frame.right, -frame.normal, frame.up], axis=-1)
+    ahead = axes[:, 1] > 0.0
+    away = np.where(ahead, axes[:, 1], np.inf)
+    side = axes[:, 0] / away * frame.distance
+    height = axes[:, 2] / away * frame.distance + frame.height
     left, right = (edge * frame.distance for edge in edges)
     level = ahead & (height > _LOW) & (height < _HIGH)
     frame_left, frame_right = left - settings.frame, right + settings.frame
@@ -102,34 +127,38 @@ def fit_surfaces(
     inside &= level & (height < _PANEL_HIGH)
     offset = inverse - rays @ frame.vector
     near = valid & (np.abs(offset) < settings.reach)
-    regions = [near & level & beside, near & inside]
-    lines = [_start(data, region, settings) for region in regions]
+
+    def seen(part: slice | int, region: NDArray[np.bool_], noise: float) -> _Seen:
+        noise *= settings.correlation / blocks.size
+        return _Seen(part, axes[region], _rows(part, axes, rays, region), inverse[region], noise)
+
+    wall_seen = seen(WALL, near & level & beside, settings.block_noise)
+    panel_seen = seen(PANEL, near & inside, settings.block_noise)
+    lines = [_start(surface, settings) for surface in (wall_seen, panel_seen)]
     if any(line is None for line in lines):
         return None
-    wall, panel = lines
-    below = valid & (data.up < 0.0) if floor else np.zeros_like(valid)
-    start = np.array([*wall, *panel, 1.0 / frame.height, *np.zeros(SIZE - 5)])
-    values, covariance, masks = _solve(
-        data, (*regions, below), start, None, calibration, blocks.size, settings
-    )
-    if min(masks[0].sum(), masks[1].sum()) < settings.min_blocks:
+    surfaces = [wall_seen, panel_seen]
+    if floor:
+        surfaces.append(seen(FLOOR, valid & (axes[:, 2] < 0.0), settings.floor_noise))
+    start = np.concatenate((lines[0], lines[1], [1.0 / frame.height], np.zeros(SIZE - 5)))
+    values, covariance, counts = _solve(surfaces, start, None, calibration, settings)
+    if min(counts[:2]) < settings.min_blocks:
         return None
     opening = _opening(values, covariance, settings)
     if opening == 0.0:
-        values, covariance, masks = _solve(
-            data, (*regions, below), values, settings.closed, calibration, blocks.size, settings
-        )
+        closed = settings.closed
+        values, covariance, counts = _solve(surfaces, values, closed, calibration, settings)
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)
-    on_panel = unhidden & (
-        np.abs(_predict(values, data, PANEL) - inverse) < settings.inlier * settings.pixel_noise
-    )
+    between = seen(PANEL, unhidden, settings.block_noise)
+    off = np.abs(between.derivatives(values) @ values - between.inverse)
+    on_panel = int((off < settings.inlier * settings.pixel_noise).sum())
     return Surfaces(
         values=values,
         covariance=covariance,
-        wall_blocks=int(masks[0].sum()),
-        panel_blocks=int(masks[1].sum()),
-        panel_share=float(on_panel.sum() / max(1, (inside & ~hidden).sum())),
+        wall_blocks=counts[0],
+        panel_blocks=counts[1],
+        panel_share=on_panel / max(1, int((inside & ~hidden).sum())),
         panel_visible=float(unhidden.sum() / max(1, inside.sum())),
         opening=opening,
     )
@@ -158,93 +187,81 @@ def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return row
 
 
-def _start(
-    data: _Data, region: NDArray[np.bool_], settings: FitSettings
-) -> NDArray[np.float64] | None:
-    """Return the line (b, c) that most blocks of a region lie on."""
-    some = np.flatnonzero(region)
-    if len(some) < settings.min_blocks:
+def _start(seen: _Seen, settings: FitSettings) -> NDArray[np.float64] | None:
+    """Return the line (b, c) that most blocks lie on."""
+    count = len(seen.inverse)
+    if count < settings.min_blocks:
         return None
-    generator = np.random.default_rng(0)
-    pairs = generator.choice(some, (_TRIALS, 2))
-    rows = np.stack([data.x[pairs], data.y[pairs]], axis=-1)
-    apart = np.abs(np.linalg.det(rows)) > 0.02
-    if not apart.any():
+    pairs = np.random.default_rng(0).integers(count, size=(_TRIALS, 2))
+    rays, inverse = seen.rays[:, :2], seen.inverse
+    first, second = rays[pairs[:, 0]], rays[pairs[:, 1]]
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    apart = np.abs(area) > _MIN_AREA
+    first, second, area = first[apart], second[apart], area[apart]
+    w1, w2 = inverse[pairs[apart]].T
+    lines = np.stack([w1 * second[:, 1] - w2 * first[:, 1], w2 * first[:, 0] - w1 * second[:, 0]])
+    lines /= area
+    lines = lines[:, (lines[1] > 0.0) & (np.abs(np.arctan2(*lines)) < _MAX_TURN)]
+    if not lines.size:
         return None
-    lines = np.linalg.solve(rows[apart], data.inverse[pairs[apart]][..., None])[..., 0]
-    lines = lines[(lines[:, 1] > 0.0) & (np.abs(np.arctan2(*lines.T)) < _MAX_TURN)]
-    if not len(lines):
-        return None
-    seen = np.stack([data.x[some], data.y[some]], axis=-1)
-    off = np.abs(seen @ lines.T - data.inverse[some, None])
+    few = slice(None, None, max(1, count // _CHECKED))
+    off = np.abs(rays[few] @ lines - inverse[few, None])
     near = off < settings.inlier * settings.pixel_noise
-    best: NDArray[np.float64] = lines[near.sum(axis=0).argmax()]
+    best: NDArray[np.float64] = lines[:, near.sum(axis=0).argmax()]
     return best
 
 
 def _rows(
-    data: _Data, mask: NDArray[np.bool_], part: slice | int, values: NDArray[np.float64]
+    part: slice | int,
+    axes: NDArray[np.float64],
+    rays: NDArray[np.float64],
+    region: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Return the derivatives (N, 12) of the inverse depths of blocks on a surface."""
-    x, y, up = data.x[mask], data.y[mask], data.up[mask]
-    rows = np.zeros((len(x), SIZE))
-    rows[:, WARP] = data.warp[mask]
+    """Return the derivatives (N, 12) of the inverse depths of blocks, but for those of the tilt."""
+    u, v = rays[region, 0], rays[region, 1]
+    rows = np.zeros((len(u), SIZE))
+    rows[:, WARP] = np.stack([np.ones_like(u), u, v, u * u], axis=-1)
     if isinstance(part, slice):
-        rows[:, part] = np.stack([x, y], axis=-1)
-        rows[:, TILT] = -up[:, None] * values[part]
+        rows[:, part] = axes[region, :2]
     else:
-        rows[:, part] = -up
+        rows[:, part] = -axes[region, 2]
         rows[:, FLOOR_OFFSET] = 1.0
-        rows[:, TILT] = -values[part] * np.stack([x, y], axis=-1)
     return rows
 
 
-def _predict(
-    values: NDArray[np.float64], data: _Data, part: slice | int
-) -> NDArray[np.float64]:
-    """Return the inverse depths (N,) that a surface has in all blocks."""
-    every = np.ones(len(data.x), dtype=np.bool_)
-    return _rows(data, every, part, values) @ values
-
-
 def _solve(
-    data: _Data,
-    regions: tuple[NDArray[np.bool_], ...],
+    surfaces: Sequence[_Seen],
     start: NDArray[np.float64],
     closed: float | None,
     calibration: Calibration,
-    size: int,
     settings: FitSettings,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.bool_]]]:
-    """Return values, covariance, and the blocks that lie on each surface."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], list[int]]:
+    """Return values, covariance, and how many blocks lie on each surface."""
     values = start.copy()
-    # So many neighbouring blocks know as much as one of them without noise of its own.
-    alone = (settings.block_noise, settings.block_noise, settings.floor_noise)
-    weights = [(noise * settings.correlation / size) ** -2.0 for noise in alone]
     reach = settings.inlier * settings.pixel_noise
     prior = np.zeros((SIZE, SIZE))
+    prior[TILT, TILT] = np.eye(2) / settings.tilt**2
     slope = calibration.slope
     deviations = np.array([calibration.offset, slope, slope, calibration.bend])
     prior[WARP, WARP] = np.diag(deviations**-2.0)
     prior[FLOOR_OFFSET, FLOOR_OFFSET] = calibration.floor**-2.0
-    prior[TILT, TILT] = np.eye(2) / settings.tilt**2
-    masks: list[NDArray[np.bool_]] = []
+    counts: list[int] = []
     for _ in range(_ROUNDS):
-        information, right_side = prior.copy(), np.zeros(SIZE)
-        masks = []
-        for part, region, weight in zip((WALL, PANEL, FLOOR), regions, weights, strict=True):
-            mask = region & (np.abs(_predict(values, data, part) - data.inverse) < reach)
-            rows = _rows(data, mask, part, values)
-            information += weight * rows.T @ rows
-            right_side += weight * rows.T @ data.inverse[mask]
-            masks.append(mask)
-        if not masks[2].any():
-            information[FLOOR, FLOOR] += 1e6  # not observed: stays where it is
-            right_side[FLOOR] += 1e6 * start[FLOOR]
+        information, right_side, counts = prior.copy(), np.zeros(SIZE), []
+        for surface in surfaces:
+            rows = surface.derivatives(values)
+            near = np.abs(rows @ values - surface.inverse) < reach
+            rows = rows[near] / surface.noise
+            information += rows.T @ rows
+            right_side += rows.T @ surface.inverse[near] / surface.noise
+            counts.append(int(near.sum()))
+        if len(counts) < 3 or not counts[2]:  # without a floor the height stays where it is
+            information[FLOOR, FLOOR] += _FIRM
+            right_side[FLOOR] += _FIRM * start[FLOOR]
         if closed is not None:
             row = _turn_row(values)
             turn = angle(values[PANEL]) - angle(values[WALL])
             information += np.outer(row, row) / closed**2
             right_side += row * (row @ values - turn) / closed**2
         values = np.linalg.solve(information, right_side)
-    return values, np.linalg.inv(information), masks
+    return values, np.linalg.inv(information), counts

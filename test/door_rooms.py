@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
+from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import RoomModel
+from kmn_perception.model.rotation import quaternion_from_matrix
 from kmn_perception.rooms.building import Plan
 from kmn_perception.rooms.design import Design, truth
 from kmn_perception.rooms.draw import Draw
@@ -17,6 +22,8 @@ from kmn_perception.rooms.placing import attitude
 from kmn_perception.rooms.rendering import render_room
 from kmn_perception.rooms.room import Door, Light, Lighting, Material, Room
 from kmn_perception.rooms.settings import RoomSettings
+from kmn_perception.ros.messages import image_from_depth, info_from_camera
+from kmn_perception.ros.stamps import stamp_of
 
 MODEL = RoomModel.load("room_door")
 SETTINGS = RoomSettings.load()
@@ -95,7 +102,71 @@ def see_door(
     return Seen(images.depth, images.grey, placed, door)
 
 
-def answers_with_names(answer: Any) -> dict[str, float]:
-    """Return the parameters of an answer by their names."""
-    names = [*answer.theta_names, *answer.gamma_names]
-    return dict(zip(names, [*answer.theta, *answer.gamma], strict=True))
+class DoorTalk:
+    """Publishes what a depth camera with an image sees to morph_node, and returns the answers."""
+
+    def __init__(self, client: Any) -> None:
+        self.client = client
+        self.image = client.create_publisher(Image, "image", 10)
+        client.graph.wait_for(self.image.get_subscription_count)
+        self._seconds = count(100)
+
+    def header(self) -> Header:
+        """Return the header of the next frame, as of a camera."""
+        made = Header(frame_id="camera_optical_frame")
+        made.stamp.sec = next(self._seconds)
+        return made
+
+    def send_image(self, image: Image) -> None:
+        """Publish an image, which is sure to have come before the depth that follows."""
+        self.image.publish(image)
+        self.image.wait_for_all_acked()
+
+    def ask(
+        self, seen: Seen, image: Image | None = None, header: Header | None = None
+    ) -> MorphingParameters:
+        """Publish an image, if there is one, and the depth; return the answer."""
+        if image is not None:
+            self.send_image(image)
+        header = header or self.header()
+        depth = image_from_depth(seen.depth.astype(np.float32), "32FC1", header)
+        return self.client.ask_depth(depth, info_from_camera(seen.camera, header))
+
+    def ask_grey(self, seen: Seen) -> MorphingParameters:
+        """Publish depth and grey image of one moment; return the answer."""
+        header = self.header()
+        return self.ask(seen, image_from_grey(seen.grey, header), header)
+
+
+def image_from_grey(
+    grey: NDArray[np.uint8], header: Header, late: float = 0.0, encoding: str = "mono8"
+) -> Image:
+    """Make the message of pixels (height, width) or (height, width, 3) of a moment before."""
+    stamp = stamp_of(header.stamp.sec - late)
+    return Image(
+        header=Header(stamp=stamp, frame_id=header.frame_id),
+        height=grey.shape[0],
+        width=grey.shape[1],
+        encoding=encoding,
+        step=grey.strides[0],
+        data=grey.tobytes(),
+    )
+
+
+def given_pose(camera: Camera) -> dict[str, Any]:
+    """Return the parameters of morph_node that tell where a camera stands."""
+    return {
+        "camera_pose": "given",
+        "camera_position": camera.pose[:3, 3].tolist(),
+        "camera_quaternion": quaternion_from_matrix(camera.pose[:3, :3]).tolist(),
+    }
+
+
+def assert_true(answer: MorphingParameters, door: Door, handle: bool = True) -> None:
+    """Check all parameters of an answer against the truth, by the answer's own deviations."""
+    number = 7 if handle else 5
+    found = np.array([*answer.theta, *answer.gamma])[:number]
+    deviations = np.sqrt(np.diag(np.reshape(answer.covariance, (7, 7))))[:number]
+    assert (deviations > 0.0).all()
+    assert deviations[:3].max() < 0.05  # neither does a large deviation excuse all
+    np.testing.assert_array_less(np.abs(found - door.values[:number]) / deviations, 3.0)

@@ -38,6 +38,7 @@ MATERIALS = {
     "floor": Material(0.40, 0.05),
 }
 LIGHTS = Lighting((Light((-2.0, 0.7, 2.4), 3.0),), 0.4, 0.0)
+SECONDS = count(100, 10)  # of the frames; no image is near the depth of another one
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -109,12 +110,11 @@ class DoorTalk:
         self.client = client
         self.image = client.create_publisher(Image, "image", 10)
         client.graph.wait_for(self.image.get_subscription_count)
-        self._seconds = count(100)
 
     def header(self) -> Header:
         """Return the header of the next frame, as of a camera."""
         made = Header(frame_id="camera_optical_frame")
-        made.stamp.sec = next(self._seconds)
+        made.stamp.sec = next(SECONDS)
         return made
 
     def send_image(self, image: Image) -> None:

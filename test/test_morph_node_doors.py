@@ -91,6 +91,7 @@ def test_a_door_with_the_handle_at_the_left_is_mirrored(talk: DoorTalk) -> None:
     # The handle that is drawn is where it is.
     grip = talk.client.overlay(answer.header.stamp)[2].pose.position
     camera = seen.camera.pose
+    assert seen.door.handle_centre is not None
     truth = camera[:3, :3] @ seen.door.handle_centre + camera[:3, 3]
     np.testing.assert_allclose([grip.x, grip.y, grip.z], truth, atol=0.06)
 

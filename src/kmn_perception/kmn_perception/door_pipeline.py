@@ -101,8 +101,8 @@ class DoorPipeline:
             return [
                 self._none(
                     view,
-                    "found points without rows and columns of a pinhole camera; "
-                    "a door in a wall is found in a depth image or an organised cloud",
+                    "found points without the rows and columns of a pinhole camera; "
+                    "expected a depth image or an organised cloud",
                 )
             ]
         depth = np.nan_to_num(view.depth(), nan=0.0).astype(np.float32)
@@ -154,33 +154,31 @@ class DoorPipeline:
         estimate = replace(none, sensor_error=sensor_error)
         return ObjectEstimate(estimate, empty, np.zeros_like(view.valid), False)
 
+    def _verdict(self, found: DoorEstimate, opening: float) -> tuple[Status, str]:
+        """Return what a door is worth as one of the model, and why it is not OK."""
+        kind, known = found.handle_kind, self.room.handles
+        if kind and kind not in known:
+            return Status.HANDLE_NOT_SEEN, (
+                f"the handle is a {kind}, of which model '{self.model.name}' knows nothing "
+                f"(known: {', '.join(known)})"
+            )
+        if found.status is DoorStatus.HANDLE_NOT_SEEN and opening and not found.handle_side:
+            return Status.AMBIGUOUS, (
+                f"the door is open by {np.degrees(abs(opening)):.0f} deg, and without a handle in "
+                "sight it is not known which side is hinged"
+            )
+        return STATUSES[found.status], found.reason
+
     def _placed(self, found: DoorEstimate, view: DepthView, camera: Camera) -> ObjectEstimate:
         """Return a door that was found, in the world of the camera's pose."""
         values, covariance = _move(found, camera.pose)
         theta, gamma = self.model.split(values)
-        status, reason, kind = STATUSES[found.status], found.reason, found.handle_kind
-        if kind and kind not in self.room.handles:
-            known = ", ".join(self.room.handles)
-            status, reason = (
-                Status.HANDLE_NOT_SEEN,
-                (
-                    f"the handle is a {kind}, of which model '{self.model.name}' knows nothing "
-                    f"(known: {known})"
-                ),
-            )
-            kind = ""
         side = found.handle_side or "right"
         # The finder's opening turns to the right as seen; the model's, away from us.
         opening = found.value(OPENING) * (1.0 if side == "left" else -1.0)
         deviation = max(found.deviation(OPENING), self.finder.settings.fit.closed)
-        if status is Status.HANDLE_NOT_SEEN and opening and not found.handle_side:
-            status, reason = (
-                Status.AMBIGUOUS,
-                (
-                    f"the door is open by {np.degrees(abs(opening)):.0f} deg, and without a handle in "
-                    "sight it is not known which side is hinged"
-                ),
-            )
+        status, reason = self._verdict(found, opening)
+        kind = found.handle_kind if found.handle_kind in self.room.handles else ""
         mask, truncated = _panel_pixels(found, view, camera)
         points = view.points[mask]
         if not view.in_world:

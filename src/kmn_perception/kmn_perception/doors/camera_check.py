@@ -1,4 +1,4 @@
-"""Whether what is seen agrees with what is said of the camera, and with a camera that is upright."""
+"""Whether what is seen agrees with what is said of the camera, and with an upright one."""
 
 from __future__ import annotations
 

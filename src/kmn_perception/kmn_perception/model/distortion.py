@@ -101,8 +101,10 @@ def resample(
     u, v = _raw_places(*_key(distortion, camera))
     finer = min(raw.fx / camera.fx, raw.fy / camera.fy)
     if finer > 1.0:  # several raw pixels in one
-        grey = cv2.GaussianBlur(grey, (0, 0), 0.5 * np.sqrt(finer**2 - 1.0) + 1e-3)
-    return cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        width = 0.5 * float(np.sqrt(finer**2 - 1.0)) + 1e-3
+        grey = cv2.GaussianBlur(grey, (0, 0), width).astype(np.float32, copy=False)
+    seen = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return seen.astype(np.float32, copy=False)
 
 
 _Intrinsics = tuple[float, float, float, float, int, int]

@@ -111,8 +111,8 @@ def grey_in_view(
 
 def _is_same(a: Camera, b: Camera) -> bool:
     """Tell whether two cameras have the same pixels."""
-    values = [(c.width, c.height, c.fx, c.fy, c.cx, c.cy) for c in (a, b)]
-    return bool(np.allclose(*values, rtol=0.0, atol=SAME))
+    first, second = (np.array([c.width, c.height, c.fx, c.fy, c.cx, c.cy]) for c in (a, b))
+    return bool((np.abs(first - second) < SAME).all())
 
 
 def _pixels(size: tuple[int, ...]) -> str:

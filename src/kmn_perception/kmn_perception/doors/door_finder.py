@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.camera_check import doubt_upright, find_contradiction
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.inverse_depth import Blocks
@@ -37,11 +38,16 @@ class Frame(NamedTuple):
         (height, width) 0 to 1, of the same pixels; None without an image.
     camera
         Their pinhole camera; its pose is not used.
+    up, height
+        What is known of the camera: the upward unit vector (3,) in the optical frame, and its
+        height above the floor, metres. What is not given is found in the frame.
     """
 
     depth: NDArray[np.float32]
     grey: NDArray[np.float32] | None
     camera: Camera
+    up: NDArray[np.float64] | None = None
+    height: float | None = None
 
 
 class DoorFinder:
@@ -67,12 +73,15 @@ class DoorFinder:
         planes = find_planes(blocks, noise, settings.planes, generator)
         if not planes:
             return DoorEstimate.none("no plane is seen")
-        segments = None
-        if frame.grey is not None:
-            segments = line_segments(frame.grey, frame.camera, settings.vertical)
-        up = find_up(planes, segments, settings.vertical)
+        up = self._up(frame, planes)
+        if frame.up is not None:
+            wrong = find_contradiction(planes, up, frame.height, settings)
+            if wrong:
+                return DoorEstimate.none(wrong)
         walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
-        floor = self._camera_height(blocks, up, walls)
+        floor = frame.height
+        if floor is None:
+            floor = self._camera_height(blocks, up, walls)
         height = settings.prior.handle_height[0] if floor is None else floor
         if not walls:
             return DoorEstimate.none("no wall is seen")
@@ -87,13 +96,26 @@ class DoorFinder:
         found: list[DoorEstimate] = []
         bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
         for candidate in candidates[: settings.candidates]:
-            best = max((door.score for door in found if door.found), default=-np.inf)
-            if candidate.score + bonus < best:
+            bar = max((door.score for door in found if door.found), default=-np.inf)
+            if candidate.score + bonus < bar:
                 break  # neither this nor a later one can be as good
             measurement = measure(frame, blocks, candidate, floor is not None, settings)
             if measurement is not None:
                 found.append(judge(measurement, settings))
-        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
+        if not found:
+            return DoorEstimate.none("no wall beside a panel is seen")
+        best = self._best(found)
+        doubt = doubt_upright(best, planes, up, settings) if frame.up is None and best.found else ""
+        return DoorEstimate.none(doubt) if doubt else best
+
+    def _up(self, frame: Frame, planes: list[Plane]) -> NDArray[np.float64]:
+        """Return the upward vector (3,) as it is given, or as the frame shows it."""
+        if frame.up is not None:
+            return frame.up
+        segments = None
+        if frame.grey is not None:
+            segments = line_segments(frame.grey, frame.camera, self.settings.vertical)
+        return find_up(planes, segments, self.settings.vertical)
 
     def _camera_height(
         self, blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane]

@@ -247,13 +247,9 @@ def _solve(
     deviations = np.array([calibration.offset, slope, slope, calibration.bend])
     prior[WARP, WARP] = np.diag(deviations**-2.0)
     prior[FLOOR_OFFSET, FLOOR_OFFSET] = calibration.floor**-2.0
-    known = np.zeros(SIZE)
-    if len(surfaces) < 3:  # without a floor the height stays where it is
-        prior[FLOOR, FLOOR] = _FIRM
-        known[FLOOR] = _FIRM * start[FLOOR]
     counts: list[int] = []
     for _ in range(_ROUNDS):
-        information, right_side, counts = prior.copy(), known.copy(), []
+        information, right_side, counts = prior.copy(), np.zeros(SIZE), []
         for surface in surfaces:
             rows = surface.derivatives(values)
             near = np.abs(rows @ values - surface.inverse) < reach
@@ -261,6 +257,9 @@ def _solve(
             information += rows.T @ rows
             right_side += rows.T @ surface.inverse[near] / surface.noise
             counts.append(int(near.sum()))
+        if len(counts) < 3 or not counts[2]:  # without a floor the height stays where it is
+            information[FLOOR, FLOOR] += _FIRM
+            right_side[FLOOR] += _FIRM * start[FLOOR]
         if closed is not None:
             row = _turn_row(values)
             turn = angle(values[PANEL]) - angle(values[WALL])

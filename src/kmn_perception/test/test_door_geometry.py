@@ -44,7 +44,9 @@ def test_a_closed_flush_door_seen_squarely_has_its_own_numbers() -> None:
     wall = line_through(left, right)
     grip = handle_before(left, right, 0.1)
     m = measured(left, right, wall, 1.2, np.array([*grip, 1.05 - 1.2]))
-    values = dict(zip(DOOR, door_values(m, handle_left=False, ajar=False, look=SQUARE), strict=True))
+    values = dict(
+        zip(DOOR, door_values(m, handle_left=False, ajar=False, look=SQUARE), strict=True)
+    )
     assert values["x"] == pytest.approx(2.0 + 0.019)
     assert values["y"] == pytest.approx(0.05)  # to the left: the door's middle is right of us
     assert values["yaw"] == pytest.approx(0.0, abs=1e-12)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,7 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallFrame, WallView
-
-if TYPE_CHECKING:
-    from kmn_perception.doors.door_finder import Frame
+from kmn_perception.doors.walls import Frame
 
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)

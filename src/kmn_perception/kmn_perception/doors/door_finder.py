@@ -15,7 +15,7 @@ from kmn_perception.doors.proposals import with_proposals
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.wall_view import WallView
-from kmn_perception.doors.walls import Frame, NoWallError, find_walls
+from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
 from kmn_perception.network.wall_network import WallNetwork
 
 
@@ -40,6 +40,19 @@ class DoorFinder:
             walls = find_walls(frame, settings, np.random.default_rng(self.seed))
         except NoWallError as error:
             return DoorEstimate.none(str(error))
+        best = self._search(frame, walls)
+        if best.handle_side and not walls.floor_seen:
+            # By the handle's usual height the camera is somewhere else above the floor.
+            walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
+            best = self._search(frame, walls)
+        if frame.up is None and best.found:
+            doubt = doubt_upright(best, walls.planes, walls.up, settings)
+            best = DoorEstimate.none(doubt) if doubt else best
+        return best
+
+    def _search(self, frame: Frame, walls: Walls) -> DoorEstimate:
+        """Return the best door of the walls."""
+        settings = self.settings
         candidates = [candidate for view in walls.views for candidate in self._candidates(view)]
         if not candidates:
             return DoorEstimate.none(_no_edges(frame))
@@ -53,13 +66,7 @@ class DoorFinder:
             measurement = measure(frame, walls.blocks, candidate, walls.floor_seen, settings)
             if measurement is not None:
                 found.append(judge(measurement, settings))
-        if not found:
-            return DoorEstimate.none("no wall beside a panel is seen")
-        best = self._best(found)
-        if frame.up is None and best.found:
-            doubt = doubt_upright(best, walls.planes, walls.up, settings)
-            best = DoorEstimate.none(doubt) if doubt else best
-        return best
+        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
 
     def _candidates(self, view: WallView) -> list[Candidate]:
         """Return the pairs of upright edges of a wall."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,11 @@ class Walls(NamedTuple):
     planes: list[Plane]
     views: list[WallView]
 
+    def at_height(self, height: float, frame: Frame, settings: DoorSettings) -> Walls:
+        """Return the walls as seen from another height above a floor that is not in view."""
+        frames = [replace(view.frame, height=height) for view in self.views]
+        return self._replace(height=height, views=_views(frames, frame, settings))
+
 
 def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Generator) -> Walls:
     """Find the walls of a frame.
@@ -94,13 +100,15 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     if floor is None:
         floor = _camera_height(blocks, up, walls, settings)
     height = settings.prior.handle_height[0] if floor is None else floor
-    views = []
-    for wall in walls[:_MAX_WALLS]:
-        at = WallFrame.of(wall.vector, up, height)
-        view = view_wall(at, frame.depth, frame.grey, frame.camera, settings.view)
-        if view is not None:
-            views.append(view)
+    frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
+    views = _views(frames, frame, settings)
     return Walls(up, height, floor is not None, blocks, planes, views)
+
+
+def _views(frames: Sequence[WallFrame], frame: Frame, settings: DoorSettings) -> list[WallView]:
+    """Return the views of walls that are in the image."""
+    views = (view_wall(at, frame.depth, frame.grey, frame.camera, settings.view) for at in frames)
+    return [view for view in views if view is not None]
 
 
 def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:

@@ -75,6 +75,13 @@ class Section:
             raise self.error(f"'{key}' must be {expected}, found {value!r}")
         return value
 
+    def flag(self, key: str) -> bool:
+        """Return true or false; an absent one is false."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise self.error(f"'{key}' must be true or false, found {value!r}")
+        return value
+
     def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
         """Return a finite number within [low, high]."""
         value = self.values.get(key)

@@ -67,7 +67,7 @@ class KinematicModel:
         section = Section.load(resources.find("config/models", name_or_path))
         section.allow(
             ("name", "camera", "input", "theta", "bodies"),
-            ("gamma", "joints", "stem", "start", "symmetry"),
+            ("gamma", "joints", "stem", "start", "symmetry", "alternatives", "surroundings"),
         )
         theta = tuple(model_file.read_theta(entry) for entry in section.sections("theta"))
         gamma = tuple(model_file.read_gamma(entry) for entry in section.sections("gamma"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +10,8 @@ from kmn_perception.configuration.section import Section, is_number
 from kmn_perception.model.parts import Body, Joint, Linear, NetworkInput, Parameter, Stem
 from kmn_perception.model.transformation import AXES, KINDS
 
+ROUNDING = 1e-9  # metres
+MIRROR = np.array([1.0, -1.0, 1.0])
 UNITS = {"translation": "m", "rotation": "rad", "scale": ""}
 
 
@@ -56,21 +57,65 @@ def _linear(section: Section, key: str, gamma: Sequence[Parameter]) -> Linear:
 
 def read_bodies(section: Section, gamma: Sequence[Parameter]) -> tuple[Body, ...]:
     """Read the bodies, whose sizes must be positive everywhere within the limits of gamma."""
-    bodies = []
-    for name in section.section("bodies").values:
-        body = section.section("bodies").section(name)
-        body.allow(("centre", "size"))
-        size = _linear(body, "size", gamma)
-        for corner in itertools.product(*[parameter.limits for parameter in gamma]):
-            if size(corner).min() <= 0.0:
-                raise body.error(
-                    f"'size' must be positive within the limits, "
-                    f"is {size(corner)} at gamma {corner}"
-                )
-        bodies.append(Body(name, _linear(body, "centre", gamma), size))
-    if not bodies:
+    bodies = section.section("bodies")
+    if not bodies.values:
         raise section.error("'bodies' is empty")
+    return tuple(_read_body(bodies.section(name), name, gamma) for name in bodies.values)
+
+
+def _read_body(section: Section, name: str, parameters: Sequence[Parameter]) -> Body:
+    section.allow(("centre", "size"))
+    body = Body(name, *(_linear(section, key, parameters) for key in ("centre", "size")))
+    smallest, corner = _smallest(body.size, parameters)
+    if smallest <= 0.0:
+        raise section.error(
+            f"'size' must be positive within the limits, "
+            f"is {body.size(corner)} at gamma {corner}"
+        )
+    return body
+
+
+def read_alternatives(
+    section: Section, parameters: Sequence[Parameter]
+) -> dict[str, tuple[Body, ...]]:
+    """Read kinds of something, each of them any number of bodies."""
+    return {
+        kind: tuple(
+            _read_body(section.section(kind).section(name), name, parameters)
+            for name in section.section(kind).values
+        )
+        for kind in section.values
+    }
+
+
+def read_surroundings(section: Section, parameters: Sequence[Parameter]) -> tuple[Body, ...]:
+    """Read what stands around an object; a size may become 0, where there is no such body.
+
+    A body that is ``mirrored`` is there twice: NAME_left, and NAME_right at the opposite y.
+    """
+    bodies = []
+    for name in section.values:
+        place = section.section(name)
+        place.allow(("centre", "size"), ("mirrored",))
+        centre, size = (_linear(place, key, parameters) for key in ("centre", "size"))
+        smallest, corner = _smallest(size, parameters)
+        if smallest < -ROUNDING:
+            raise place.error(f"'size' must not be negative, is {size(corner)} at {corner}")
+        if not place.flag("mirrored"):
+            bodies.append(Body(name, centre, size))
+            continue
+        opposite = Linear(centre.constant * MIRROR, centre.slope * MIRROR[:, None])
+        bodies += [Body(f"{name}_left", centre, size), Body(f"{name}_right", opposite, size)]
     return tuple(bodies)
+
+
+def _smallest(size: Linear, parameters: Sequence[Parameter]) -> tuple[float, tuple[float, ...]]:
+    """Return the smallest entry of a size within the limits (m), and where it is found."""
+    limits = np.array([parameter.limits for parameter in parameters]).reshape(-1, 2)
+    corners = np.where(size.slope > 0.0, limits[:, 0], limits[:, 1])
+    least = size.constant + (size.slope * corners).sum(axis=1)
+    row = int(least.argmin())
+    return float(least[row]), tuple(corners[row].tolist())
 
 
 def read_joints(

@@ -24,12 +24,34 @@ def render(unit_cubes: NDArray[np.float64], camera: Camera) -> NDArray[np.float3
         (height, width) metres along the optical axis; NaN where there is nothing, or something
         nearer or farther than the camera measures.
     """
+    return _render(unit_cubes, camera, None)
+
+
+def render_bodies(
+    unit_cubes: NDArray[np.float64], camera: Camera
+) -> tuple[NDArray[np.float32], NDArray[np.int16]]:
+    """Cast rays as in `render`, and tell which cube each of them meets first.
+
+    Returns
+    -------
+    depth
+        (height, width) as of `render`.
+    bodies
+        (height, width) index of the cube; -1 where there is none.
+    """
+    bodies = np.full((camera.height, camera.width), -1, dtype=np.int16)
+    return _render(unit_cubes, camera, bodies), bodies
+
+
+def _render(
+    unit_cubes: NDArray[np.float64], camera: Camera, bodies: NDArray[np.int16] | None
+) -> NDArray[np.float32]:
     depth = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
-    for cube in unit_cubes:
+    for index, cube in enumerate(unit_cubes):
         cube_to_camera = camera.world_to_camera @ cube
         window = _window(cube_to_camera, camera)
-        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, window)
+        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, window, bodies, index)
     depth[(depth < camera.near) | (depth > camera.far)] = np.nan
     return depth
 
@@ -98,27 +120,40 @@ def _cast(
     cx: float,
     cy: float,
     window: tuple[int, int, int, int],
+    bodies: NDArray[np.int16] | None,
+    index: int,
 ) -> None:
-    """Lower ``depth`` to where the rays of the window enter the cube (slab method)."""
+    """Lower ``depth`` to where the rays of the window enter the cube."""
     u0, u1, v0, v1 = window
     for v in range(v0, v1):
         ray_y = (v - cy) / fy
         for u in range(u0, u1):
-            ray_x = (u - cx) / fx
-            enter, leave = 0.0, np.inf
-            for axis in range(3):
-                slope = (
-                    camera_to_cube[axis, 0] * ray_x
-                    + camera_to_cube[axis, 1] * ray_y
-                    + camera_to_cube[axis, 2]
-                )
-                start = camera_to_cube[axis, 3]
-                if abs(slope) < 1e-12:
-                    if abs(start) > 0.5:
-                        leave = -1.0
-                    continue
-                first, second = (-0.5 - start) / slope, (0.5 - start) / slope
-                enter = max(enter, min(first, second))
-                leave = min(leave, max(first, second))
-            if enter < leave and enter < depth[v, u]:
+            enter = meet_cube(camera_to_cube, (u - cx) / fx, ray_y)
+            if enter < depth[v, u]:
                 depth[v, u] = enter
+                if bodies is not None:
+                    bodies[v, u] = index
+
+
+@njit(cache=True)
+def meet_cube(camera_to_cube: NDArray[np.float64], ray_x: float, ray_y: float) -> float:
+    """Return the depth at which the ray (x, y, 1) enters the unit cube (slab method).
+
+    It is along the optical axis, metres, and infinite if the ray misses the cube.
+    """
+    enter, leave = 0.0, np.inf
+    for axis in range(3):
+        slope = (
+            camera_to_cube[axis, 0] * ray_x
+            + camera_to_cube[axis, 1] * ray_y
+            + camera_to_cube[axis, 2]
+        )
+        start = camera_to_cube[axis, 3]
+        if abs(slope) < 1e-12:
+            if abs(start) > 0.5:
+                leave = -1.0
+            continue
+        first, second = (-0.5 - start) / slope, (0.5 - start) / slope
+        enter = max(enter, min(first, second))
+        leave = min(leave, max(first, second))
+    return enter if enter < leave else np.inf

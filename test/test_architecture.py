@@ -16,7 +16,7 @@ TIERS = {
     "kmn_perception": (
         ("configuration",),
         ("command_line", "model"),
-        ("scene", "network", "refinement"),
+        ("scene", "network", "refinement", "rooms"),
         ("estimator",),
         ("pipeline",),
         ("training", "visualization"),

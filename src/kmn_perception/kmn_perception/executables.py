@@ -10,5 +10,6 @@ EXECUTABLES = {
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
+    "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "benchmark": ("kmn_perception.benchmark", ""),
 }

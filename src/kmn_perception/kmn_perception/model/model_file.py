@@ -69,8 +69,7 @@ def _read_body(section: Section, name: str, parameters: Sequence[Parameter]) -> 
     smallest, corner = _smallest(body.size, parameters)
     if smallest <= 0.0:
         raise section.error(
-            f"'size' must be positive within the limits, "
-            f"is {body.size(corner)} at gamma {corner}"
+            f"'size' must be positive within the limits, is {body.size(corner)} at gamma {corner}"
         )
     return body
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.noisy_sensor import NoisySensor
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.kinect import Kinect
 from kmn_sim.world.scenario import Scenario, ScenarioError
 from kmn_sim.world.simulation import Simulation
 
@@ -93,7 +93,11 @@ def test_fingers_close_together(simulate: Simulate) -> None:
 
 def run(simulation: Simulation) -> list[NDArray[Any]]:
     """Return what happens in a run with an arm that moves and a noisy camera."""
-    camera = DepthCamera(simulation.scenario.model.camera, "world", Kinect(KinectV1.load(), seed=5))
+    camera = DepthCamera(
+        simulation.scenario.model.camera,
+        "world",
+        NoisySensor(DepthSensor.load("kinect_v1"), seed=5),
+    )
     reach(simulation, 0.5)
     seen: list[NDArray[Any]] = []
     for _ in range(3):

@@ -36,6 +36,7 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
+Pixels = Annotated[int, Field(ge=0)]
 
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:

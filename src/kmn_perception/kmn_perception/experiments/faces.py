@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.experiments.settings import FaceSettings
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
 
 SIDES = ("-x", "+x", "-y", "+y", "top")
 TOP = 4
@@ -50,7 +50,7 @@ def box_axes(yaw: float) -> NDArray[np.float64]:
 
 def axial_noise(depth: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviation of a Kinect's depth (Nguyen, Izadi and Lovell, 2012)."""
-    return KinectV1.load().axial.nguyen.deviation(depth)
+    return DepthSensor.load("kinect_v1").nguyen.deviation(depth)
 
 
 def smoothed_normals(

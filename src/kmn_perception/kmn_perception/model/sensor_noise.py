@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
 
 NOISES = ("none", "mm", "kinect")
 
@@ -26,10 +26,10 @@ def add_noise(
         return depth
     if noise == "mm":
         return (np.round(depth * 1e3) / 1e3).astype(np.float32)
-    sensor = KinectV1.load()
+    sensor = DepthSensor.load("kinect_v1")
     disparity = sensor.disparity
     return _kinect(
-        depth, sensor.lateral, *sensor.axial.nguyen, disparity.scale, disparity.step, generator
+        depth, sensor.lateral, *sensor.nguyen, disparity.scale, disparity.step, generator
     )
 
 

@@ -18,7 +18,8 @@ from kmn_perception.estimator import Status
 from kmn_perception.experiments.experiment import load_pipeline
 from kmn_perception.experiments.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
+from kmn_perception.model.noisy_sensor import NoisySensor
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.pipeline import MorphPipeline
@@ -26,7 +27,6 @@ from kmn_perception.scene.camera_pose import NoCameraPoseError
 from kmn_perception.scene.depth_view import DepthView
 from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
 from kmn_sim.checks.settings import NoiseCheckSettings
-from kmn_sim.sensors.kinect import Kinect
 
 
 class Frame(NamedTuple):
@@ -48,12 +48,13 @@ def twins(
     frames: Sequence[LabelledFrame], settings: NoiseCheckSettings, seed: int
 ) -> Iterator[Twins]:
     """Yield real frames with their simulated twins; frames without an estimate are left out."""
-    pipeline, sensor, camera = load_pipeline(), KinectV1.load(), Camera.load(settings.camera)
+    sensor, camera = DepthSensor.load(settings.camera), Camera.load(settings.camera)
+    pipeline = load_pipeline()
     for number, frame in enumerate(frames):
         real = Frame(frame.depth, frame.labels == TABLE, frame.labels == frame.objects[0])
         scene = scene_of(real, camera, pipeline)
         if scene is not None:
-            yield Twins(real, simulate(*scene, settings.table, Kinect(sensor, seed + number)))
+            yield Twins(real, simulate(*scene, settings.table, NoisySensor(sensor, seed + number)))
 
 
 def scene_of(
@@ -76,14 +77,14 @@ def scene_of(
 
 
 def simulate(
-    camera: Camera, box: NDArray[np.float64], table_size: Sequence[float], kinect: Kinect
+    camera: Camera, box: NDArray[np.float64], table_size: Sequence[float], sensor: NoisySensor
 ) -> Frame:
     """Return what the simulated sensor measures of a box on a table, in whole millimetres."""
     table = np.diag([*table_size, 1.0])
     table[2, 3] = -table_size[2] / 2.0
     exact = render(np.concatenate([table[None], box]), camera)
     is_box = render(box, camera) == exact
-    depth = np.round(1e3 * kinect.measure(exact, camera.fx)) / 1e3
+    depth = np.round(1e3 * sensor.measure(exact, camera.fx)) / 1e3
     return Frame(depth.astype(np.float32), np.isfinite(exact) & ~is_box, is_box)
 
 

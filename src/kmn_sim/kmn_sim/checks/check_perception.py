@@ -13,10 +13,10 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_sim.checks.scene_client import SceneEstimate, scene_client
 from kmn_sim.checks.settings import PerceptionCheckSettings
-from kmn_sim.sensors.kinect import NOISES
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
@@ -25,7 +25,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--model", default="door", help="shipped name or file (default door)")
     parser.add_argument("--scenes", type=whole_number(1), default=20, help="default 20")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of scenes and noise")
-    parser.add_argument("--noise", choices=NOISES, default="none", help="default none")
+    parser.add_argument("--noise", choices=("none", *SENSORS), default="none", help="default none")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     return parser.parse_args(argv)
 

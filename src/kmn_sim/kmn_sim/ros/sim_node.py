@@ -19,7 +19,8 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
+from kmn_perception.model.noisy_sensor import SENSORS, NoisySensor
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 from kmn_perception.ros.node_program import run_node
@@ -31,7 +32,6 @@ from kmn_sim.ros import messages
 from kmn_sim.ros.sim_node_parameters import RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.sensors.kinect import Kinect
 from kmn_sim.sensors.recording import RecordingError
 from kmn_sim.sensors.recordings import Recordings
 from kmn_sim.sensors.settings import RecordingSettings
@@ -122,9 +122,9 @@ class SimNode(Node):
 
     @staticmethod
     def _make_camera(settings: SimNodeSettings) -> DepthCamera:
-        noisy = settings["noise"] == "kinect"
-        kinect = Kinect(KinectV1.load(), settings["seed"]) if noisy else None
-        return DepthCamera(settings.camera, settings["camera_mount"], kinect)
+        kind = SENSORS.get(settings["noise"])
+        sensor = NoisySensor(DepthSensor.load(kind), settings["seed"]) if kind else None
+        return DepthCamera(settings.camera, settings["camera_mount"], sensor)
 
     def _header(self, simulation: Simulation, frame: str) -> Header:
         """Return a header of the present, in simulated time if that is published."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
-from kmn_sim.sensors.kinect import Kinect
+from kmn_perception.model.noisy_sensor import NoisySensor
 from kmn_sim.world.simulation import Simulation
 
 
@@ -21,12 +21,14 @@ class DepthCamera:
         Intrinsics, and the pose in the world or in the base's frame.
     mount
         ``world`` or ``base``.
-    kinect
+    sensor
         What it makes of the exact depth; None: it measures exactly.
     """
 
-    def __init__(self, camera: Camera, mount: str = "world", kinect: Kinect | None = None) -> None:
-        self._camera, self._mount, self._kinect = camera, mount, kinect
+    def __init__(
+        self, camera: Camera, mount: str = "world", sensor: NoisySensor | None = None
+    ) -> None:
+        self._camera, self._mount, self._sensor = camera, mount, sensor
 
     def camera(self, simulation: Simulation) -> Camera:
         """Return the camera where it is at present, in the world."""
@@ -37,4 +39,4 @@ class DepthCamera:
     def capture(self, simulation: Simulation) -> NDArray[np.float32]:
         """Return the depth image (height, width) at present, metres, NaN for none."""
         exact = simulation.renderer.render(self.camera(simulation)).depth
-        return exact if self._kinect is None else self._kinect.measure(exact, self._camera.fx)
+        return exact if self._sensor is None else self._sensor.measure(exact, self._camera.fx)

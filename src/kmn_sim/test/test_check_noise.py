@@ -7,16 +7,16 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.kinect_v1 import KinectV1
+from kmn_perception.model.depth_sensor import DepthSensor
+from kmn_perception.model.noisy_sensor import NoisySensor
 from kmn_sim.checks.check_noise import compare
 from kmn_sim.checks.noise_statistics import inverse_step, missing_runs, plane_noise
-from kmn_sim.sensors.kinect import Kinect
 
 FX = Camera.load("kinect_v1").fx
 
 
-def kinect(seed: int = 0) -> Kinect:
-    return Kinect(KinectV1.load(), seed)
+def kinect(seed: int = 0) -> NoisySensor:
+    return NoisySensor(DepthSensor.load("kinect_v1"), seed)
 
 
 def plane(distance: float) -> NDArray[np.float32]:

@@ -12,34 +12,31 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
 from kmn_perception.rooms.design import EDGES, seen_edges
-from kmn_perception.rooms.room import Door, Room
+from kmn_perception.rooms.frame import Frame
+from kmn_perception.rooms.room import Door
 
 DIGITS = 6
 VISIBLE = 0.2  # fraction of an edge, from which on it counts as visible
 CLOSED = 0.5  # degrees of opening, up to which a door counts as closed
 
 
-def label(
-    room: Room, depth: NDArray[np.float32], name: str, seed: int, sensor: str
-) -> dict[str, Any]:
-    """Return the label of a room.
+def label(frame: Frame, name: str, source: dict[str, Any]) -> dict[str, Any]:
+    """Return the label of a frame.
 
     Parameters
     ----------
-    depth
-        (height, width) exact, metres.
     name
         Of the frame: its files are NAME_d.png, NAME_colour.jpg and NAME.json.
-    seed, sensor
+    source
         How it was made.
     """
-    camera = room.camera
+    room, camera = frame.room, frame.room.camera
     result: dict[str, Any] = {
         "frame": name,
-        "door_id": f"rendered_{seed}",
+        "door_id": name,
         "kind": room.kind,
         "split": "rendered",
-        "source": {"seed": seed, "sensor": sensor},
+        "source": {**source, "offset_1_per_m": round(frame.offset, DIGITS)},
         "intrinsics": {
             "width": camera.width,
             "height": camera.height,
@@ -64,7 +61,7 @@ def label(
         "annotations": {
             "edges": {
                 name: {"visible": seen >= VISIBLE, "seen": round(seen, 2)}
-                for name, seen in seen_edges(door, camera, depth).items()
+                for name, seen in seen_edges(door, camera, frame.images.depth).items()
             }
         },
         "reference": {"metric": metric(door, camera)},

@@ -23,11 +23,11 @@ class Images(NamedTuple):
     Attributes
     ----------
     depth
-        (height, width) exact, metres; NaN where there is nothing.
+        (height, width) exact, metres; NaN where there is nothing, or glass.
     grey
         (height, width) with blur, noise and gamma.
     bodies
-        (height, width) index of the cuboid whose depth it is; -1 where there is none.
+        (height, width) index of the cuboid that is seen; -1 where there is none.
     """
 
     depth: NDArray[np.float32]
@@ -47,10 +47,8 @@ def render_room(room: Room, settings: ImageSettings, generator: np.random.Genera
     depth, bodies = render_bodies(cubes, room.camera)
     light = _radiance(room, cubes, bodies, settings, generator)
     grey = _expose(light, settings, generator)
-    if room.transparent:
-        seen = [body.name not in room.transparent for body in room.cuboids]
-        depth, behind = render_bodies(cubes[seen], room.camera)
-        bodies = np.where(behind >= 0, np.flatnonzero(seen)[behind], -1).astype(np.int16)
+    lost = [k for k, body in enumerate(room.cuboids) if body.name in room.glass]
+    depth[np.isin(bodies, lost)] = np.nan
     return Images(depth, grey, bodies)
 
 

@@ -123,9 +123,9 @@ class Room:
     camera
         With its pose in the world, where z = 0 is the floor.
     door
-        The truth; None if no single door is there to be found.
-    transparent
-        Names of bodies through which depth is measured: glass.
+        The truth; None if there is no single solid door.
+    glass
+        Names of bodies that the grey image shows, and where no depth is measured.
     """
 
     kind: str
@@ -134,7 +134,7 @@ class Room:
     lighting: Lighting
     camera: Camera
     door: Door | None
-    transparent: tuple[str, ...] = ()
+    glass: tuple[str, ...] = ()
 
 
 def cuboid(

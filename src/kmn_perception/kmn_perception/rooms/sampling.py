@@ -1,100 +1,81 @@
-"""Random rooms by their seeds: a door in a wall, what is around it, and where the camera stands."""
+"""Random rooms by their seeds: with a door in a wall, or with what could be taken for one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable
+from typing import NamedTuple
 
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import RoomModel
-from kmn_perception.rooms.design import Design, draw_design, truth
+from kmn_perception.rooms import negatives
+from kmn_perception.rooms.building import Plan, build_door
+from kmn_perception.rooms.design import Design, corners, draw_design
 from kmn_perception.rooms.draw import Draw
-from kmn_perception.rooms.furnishing import Site, draw_lighting, furnish, on_panel
 from kmn_perception.rooms.placing import edges_in_view, place
-from kmn_perception.rooms.room import Cuboid, Material, Room
-from kmn_perception.rooms.settings import LooksSettings, RoomSettings
+from kmn_perception.rooms.room import Room
+from kmn_perception.rooms.settings import RoomSettings
 
 
-def sample_room(seed: int, camera: Camera, settings: RoomSettings) -> Room:
-    """Return the room with a door of a seed, seen by a camera of which only the pose is drawn."""
-    draw, model = Draw(seed), RoomModel.load(settings.model)
-    design = draw_design(draw, model, settings.door)
-    where = settings.camera
-    needed = 2 if draw.chance(where.both_edges) else 1
-    placed, seen_by = place(
-        draw, design, model, camera, where,
-        lambda c, d: edges_in_view(c, d, model, where.margin) >= needed,
-    )  # fmt: skip
-    return door_room(draw, placed, model, seen_by, settings)
+class Kind(NamedTuple):
+    """A kind of room: how it is built, and which places of the camera suit it."""
+
+    build: Callable[[Plan, str], Room]
+    suits: Callable[[Plan], bool] | None = None
 
 
-def door_room(
-    draw: Draw, design: Design, model: RoomModel, camera: Camera, settings: RoomSettings
-) -> Room:
-    """Return the room around a door that has its place."""
-    materials = draw_materials(draw, settings.looks)
-    names, cubes = model.cubes(
-        design.values,
-        model.nuisances(**design.nuisance),
-        design.handle,
-        design.side,
-        design.fitting,
-    )
-    built = [
-        Cuboid(name, cube, materials[name.partition("_")[0]])
-        for name, cube in zip(names, cubes, strict=True)
-    ]
-    size = model.model.body("panel").size(model.model.split(design.values)[1])
-    panel = model.pose(design.values, design.side, design.nuisance["opening"])
-    site = site_of(design, model, size, camera)
-    things, looks = settings.things, settings.looks
-    return Room(
-        kind="door",
-        cuboids=(
-            *on_panel(draw, panel, size, materials["panel"], things, looks),
-            *built,
-            *furnish(draw, site, materials["wall"], things, looks),
-        ),
-        wall=site.wall,
-        lighting=draw_lighting(draw, settings.lights),
-        camera=camera,
-        door=truth(design, model, camera),
-    )
+def _one_edge(plan: Plan) -> bool:
+    margin = plan.settings.camera.margin
+    return edges_in_view(plan.camera, plan.design, plan.model, -margin) == 1
 
 
-def site_of(design: Design, model: RoomModel, size: NDArray[np.float64], camera: Camera) -> Site:
-    """Return where a door of a size (3,) stands."""
-    wall = model.pose(design.values)
-    nuisance = design.nuisance
-    return Site(
-        wall=wall,
-        face=float(-size[0] / 2.0 - nuisance["recess"]),
-        half=float(size[1] / 2.0 + nuisance["frame_width"] + 0.004),
-        camera=(np.linalg.inv(wall) @ camera.pose)[:3, 3],
-    )
+def _no_floor(plan: Plan) -> bool:
+    """Tell whether the floor before the door is below the image."""
+    found = corners(plan.design, plan.model)
+    rows = [plan.camera.project(found[name])[1:] for name in ("bottom_left", "bottom_right")]
+    both = edges_in_view(plan.camera, plan.design, plan.model, 0.0) == 2
+    return both and all(z > 0.0 and v > 1.2 * plan.camera.height for v, z in rows)
 
 
-def draw_materials(draw: Draw, looks: LooksSettings) -> Mapping[str, Material]:
-    """Draw how the bodies of the model look, by the first words of their names."""
-    wall = draw.material(looks, looks.wall)
-    panel = draw.material(looks, looks.panel, wall)
-    if draw.chance(looks.wood):
-        along = panel.grain[2] * looks.stretch
-        panel = panel._replace(grain=(panel.grain[0], panel.grain[1], along))
-    frame = draw.material(looks, looks.other, wall if draw.chance(0.5) else panel)
-    handle = draw.material(looks, looks.other)
-    if draw.chance(looks.tiles):
-        wall = draw.tiled(wall, looks.tile, stagger=0.0)
-    floor = draw.material(looks, looks.other)
-    return {
-        "panel": panel,
-        "handle": handle,
-        "fitting": handle,
-        "wall": wall,
-        "post": frame,
-        "lintel": frame,
-        "seal": draw.material(looks, looks.seal),
-        "floor": floor,
-    }
+def _within_corridor(plan: Plan) -> bool:
+    return bool(abs(plan.site.camera[1]) < plan.settings.negatives.corridor_half[0] - 0.2)
+
+
+KINDS = {
+    "door": Kind(build_door),
+    "person": Kind(negatives.build_person),
+    "one_edge": Kind(build_door, _one_edge),
+    "no_floor": Kind(build_door, _no_floor),
+    "wall": Kind(negatives.build_wall),
+    "brick": Kind(negatives.build_wall),
+    "cupboard": Kind(negatives.build_wall),
+    "window": Kind(negatives.build_wall),
+    "poster": Kind(negatives.build_wall),
+    "corridor": Kind(negatives.build_corridor, _within_corridor),
+    "glass": Kind(negatives.build_glass),
+    "double": Kind(negatives.build_double),
+}
+
+
+def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "door") -> Room:
+    """Return the room of a seed, seen by a camera of which only the pose is drawn.
+
+    Parameters
+    ----------
+    kind
+        One of ``KINDS``; the first four have a door.
+    """
+    draw, model = Draw(seed, list(KINDS).index(kind)), RoomModel.load(settings.model)
+    design, where = draw_design(draw, model, settings.door), settings.camera
+    if kind == "one_edge":
+        where = where._replace(heading=settings.negatives.one_edge_heading)
+    elif kind == "no_floor":
+        where = where._replace(aim=settings.negatives.no_floor_aim)
+    needed, suits = 2 if draw.chance(where.both_edges) else 1, KINDS[kind].suits
+
+    def acceptable(seen_by: Camera, placed: Design) -> bool:
+        if suits is not None:
+            return suits(Plan(draw, placed, model, seen_by, settings))
+        return edges_in_view(seen_by, placed, model, where.margin) >= needed
+
+    placed, seen_by = place(draw, design, model, camera, where, acceptable)
+    return KINDS[kind].build(Plan(draw, placed, model, seen_by, settings), kind)

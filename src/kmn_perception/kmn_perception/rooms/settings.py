@@ -149,6 +149,18 @@ class ThingsSettings(NamedTuple):
     clearance: NonNegative
 
 
+class NegativesSettings(NamedTuple):
+    """Rooms without a door, or where it is hard to see; see the file."""
+
+    one_edge_heading: NonNegative
+    no_floor_aim: Interval
+    corridor_length: Interval
+    corridor_half: Interval
+    cupboard_depth: Interval
+    sill: Interval
+    rim: Interval
+
+
 class NoiseSettings(NamedTuple):
     """Noise of the grey image: deviation sqrt(shot^2 value + read^2), of a value up to 1."""
 
@@ -197,6 +209,7 @@ class RoomSettings(NamedTuple):
     looks: LooksSettings
     lights: LightsSettings
     things: ThingsSettings
+    negatives: NegativesSettings
     image: ImageSettings
 
     @classmethod

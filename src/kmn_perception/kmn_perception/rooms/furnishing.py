@@ -77,7 +77,8 @@ def furnish(
         thickness = draw.between(size.thickness)
         z = draw.between((0.9 + height / 2.0, 2.3 - height / 2.0))
         centre = (site.face - thickness / 2.0, y, z)
-        found.append(site.at("poster", centre, (thickness, width, height), other()))
+        look = printed(draw, other(), things, looks)
+        found.append(site.at("poster", centre, (thickness, width, height), look))
     if draw.chance(things.switch):
         y = draw.sign() * (site.half + draw.between((0.06, 0.25)))
         centre = (site.face - 0.006, y, draw.between((0.95, 1.25)))
@@ -165,6 +166,15 @@ def _clear(things: list[Cuboid], site: Site, clearance: float) -> list[Cuboid]:
     return things
 
 
+def printed(
+    draw: Draw, material: Material, things: ThingsSettings, looks: LooksSettings
+) -> Material:
+    """Draw whether something is written on a material."""
+    if draw.chance(things.printed):
+        return draw.tiled(material, looks.print, stagger=draw.between((0.0, 0.5)))
+    return material
+
+
 def on_panel(
     draw: Draw,
     panel: NDArray[np.float64],
@@ -181,7 +191,8 @@ def on_panel(
         y = draw.between((-0.5, 0.5)) * (size[1] - width - 0.1)
         low = (front - 0.001, y - width / 2.0, z - height / 2.0)
         high = (front, y + width / 2.0, z + height / 2.0)
-        found.append(cuboid("sign", low, high, draw.material(looks, looks.other), panel))
+        look = printed(draw, draw.material(looks, looks.other), things, looks)
+        found.append(cuboid("sign", low, high, look, panel))
     if draw.chance(things.mouldings):
         side, depth = draw.between((0.12, 0.2)), draw.between((0.004, 0.012))
         inner = size[1] / 2.0 - side

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 from kmn_perception.model.camera import Camera
@@ -56,6 +57,9 @@ KINDS = {
 }
 
 
+_model = cache(RoomModel.load)  # which takes longer than all draws
+
+
 def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "door") -> Room:
     """Return the room of a seed, seen by a camera of which only the pose is drawn.
 
@@ -64,7 +68,7 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
     kind
         One of ``KINDS``; the first four have a door.
     """
-    draw, model = Draw(seed, list(KINDS).index(kind)), RoomModel.load(settings.model)
+    draw, model = Draw(seed, list(KINDS).index(kind)), _model(settings.model)
     design, where = draw_design(draw, model, settings.door), settings.camera
     if kind == "one_edge":
         where = where._replace(heading=settings.negatives.one_edge_heading)

@@ -91,6 +91,7 @@ class LooksSettings(NamedTuple):
     stretch: Positive
     tiles: Fraction
     tile: TileSettings
+    print: TileSettings
     brick: TileSettings
 
 
@@ -135,6 +136,7 @@ class ThingsSettings(NamedTuple):
     skirting: Fraction
     skirting_size: SkirtingSettings
     posters: tuple[int, int]
+    printed: Fraction
     poster_size: PosterSettings
     sign: Fraction
     switch: Fraction
@@ -189,6 +191,8 @@ class ImageSettings(NamedTuple):
         Deviation of lens and demosaicing, pixels.
     gamma
         Values are stored to the power of 1 / gamma.
+    moved, motion
+        How often the camera moves while it sees, and by how many pixels.
     """
 
     subsamples: Count
@@ -196,6 +200,8 @@ class ImageSettings(NamedTuple):
     percentile: Positive
     blur: Positive
     gamma: Positive
+    moved: Fraction
+    motion: Interval
     noise: NoiseSettings
     shadow: ShadowSettings
 

@@ -184,7 +184,7 @@ def test_rooms_are_as_the_settings_say() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_room_is_rendered(kind: str) -> None:
     frame = make_frame(1, kind=kind)
-    there = kind in ("door", "person", "one_edge", "no_floor")
+    there = kind in ("door", "person", "one_edge", "no_floor", "wide_open")
     assert (frame.room.door is not None) == there
     assert np.isfinite(frame.depth).mean() > 0.3
     assert frame.images.grey.std() > 2.0

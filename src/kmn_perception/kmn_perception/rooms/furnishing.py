@@ -157,7 +157,7 @@ def chair(draw: Draw, site: Site, at: tuple[float, float], material: Material) -
 
 
 def _clear(things: list[Cuboid], site: Site, clearance: float) -> list[Cuboid]:
-    """Return things that leave room for the camera and do not stand in the wall, else none."""
+    """Return things if all of them are off the camera by a clearance, else none."""
     for thing in things:
         middle = (np.linalg.inv(site.wall) @ thing.cube)[:3, 3]
         reach = np.linalg.norm(thing.cube[:2, :2], axis=0).sum() / 2.0

@@ -97,6 +97,13 @@ def build_double(plan: Plan, kind: str) -> Room:
     return wide.room(kind, bodies, materials["wall"])
 
 
+def build_doorway(plan: Plan, kind: str) -> Room:
+    """Return the opening of a door that is not there."""
+    materials = draw_materials(plan.draw, plan.settings.looks)
+    bodies = [body for body in plan.cuboids(materials) if _is_around(body)]
+    return plan.room(kind, bodies, materials["wall"])
+
+
 def build_person(plan: Plan, kind: str) -> Room:
     """Return a door with somebody before it."""
     return build_door(plan, kind, person(plan.draw, plan.site, plan.settings.looks.other))

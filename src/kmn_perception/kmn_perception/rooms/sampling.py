@@ -46,6 +46,7 @@ KINDS = {
     "person": Kind(negatives.build_person),
     "one_edge": Kind(build_door, _one_edge),
     "no_floor": Kind(build_door, _no_floor),
+    "wide_open": Kind(build_door),
     "wall": Kind(negatives.build_wall),
     "brick": Kind(negatives.build_wall),
     "cupboard": Kind(negatives.build_wall),
@@ -54,6 +55,7 @@ KINDS = {
     "corridor": Kind(negatives.build_corridor, _within_corridor),
     "glass": Kind(negatives.build_glass),
     "double": Kind(negatives.build_double),
+    "doorway": Kind(negatives.build_doorway),
 }
 
 
@@ -66,7 +68,7 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
     Parameters
     ----------
     kind
-        One of ``KINDS``; the first four have a door.
+        One of ``KINDS``; the first five have a door.
     """
     draw, model = Draw(seed, list(KINDS).index(kind)), _model(settings.model)
     design, where = draw_design(draw, model, settings.door), settings.camera
@@ -74,6 +76,9 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
         where = where._replace(heading=settings.negatives.one_edge_heading)
     elif kind == "no_floor":
         where = where._replace(aim=settings.negatives.no_floor_aim)
+    elif kind == "wide_open":
+        wide = {"opening": draw.between(settings.negatives.wide_open)}
+        design = design._replace(nuisance=design.nuisance | wide)
     needed, suits = 2 if draw.chance(where.both_edges) else 1, KINDS[kind].suits
 
     def acceptable(seen_by: Camera, placed: Design) -> bool:

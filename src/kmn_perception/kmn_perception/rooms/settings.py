@@ -156,6 +156,7 @@ class NegativesSettings(NamedTuple):
 
     one_edge_heading: NonNegative
     no_floor_aim: Interval
+    wide_open: Interval
     corridor_length: Interval
     corridor_half: Interval
     cupboard_depth: Interval

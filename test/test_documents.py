@@ -10,6 +10,7 @@ import pytest
 
 from kmn_perception.configuration.node_parameters import parameter_table
 from kmn_perception.configuration.resources import share_directory
+from kmn_perception.rooms.sampling import KINDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -55,3 +56,9 @@ def test_the_shared_memory_that_a_process_takes_stands_there() -> None:
     stated = re.search(r"needs (\d+) MiB of `/dev/shm` for each process", text)
     assert stated is not None
     assert int(stated[1]) * 2**20 == int(size)
+
+
+def test_every_kind_of_room_stands_there() -> None:
+    text = (ROOT / "docs/rooms.md").read_text(encoding="utf-8")
+    rows = "".join(re.findall(r"^\| (`.*?) \|", text, flags=re.MULTILINE))
+    assert set(re.findall(r"`(\w+)`", rows)) == set(KINDS)

@@ -11,6 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.room_model import RoomModel
+from kmn_perception.rooms.design import draw_design
+from kmn_perception.rooms.draw import Draw
 from kmn_perception.rooms.frame import Frame, make_frame
 from kmn_perception.rooms.label import label
 from kmn_perception.rooms.render_rooms import main
@@ -158,27 +161,47 @@ def test_a_seed_gives_the_same_frame(frames: list[Frame]) -> None:
     assert (again.images.grey != frames[4].images.grey).any()
 
 
-def test_rooms_are_as_the_settings_say() -> None:
-    doors, views = [], []
-    for seed in range(150):
-        room = sample_room(seed, CAMERA, SETTINGS)
-        assert room.door is not None
-        doors.append(room.door)
-        top = [room.door.corners[f"{end}_{side}"] for side in ("left", "right")
-               for end in ("top", "bottom")]  # fmt: skip
-        to_wall = np.linalg.inv(room.wall) @ room.camera.pose
-        views.append(np.hypot(*to_wall[:2, 3]))
-        assert 0.5 <= to_wall[2, 3] <= 1.8
-        assert len(top) == 4
-    distance = SETTINGS.camera.distance
-    assert distance[0] - 1e-6 <= min(views) and max(views) <= distance[1] + 1e-6
+def test_doors_are_as_often_what_the_settings_say() -> None:
+    model = RoomModel.load(SETTINGS.model)
+    doors = [draw_design(Draw(seed), model, SETTINGS.door) for seed in range(1000)]
     recess = np.array([door.nuisance["recess"] for door in doors])
     opening = np.array([door.nuisance["opening"] for door in doors])
-    assert np.mean(np.abs(recess) <= 0.005) == pytest.approx(0.5, abs=0.15)
-    assert np.mean(opening == 0.0) == pytest.approx(0.7, abs=0.12)
+    assert np.mean(np.abs(recess) <= 0.005) == pytest.approx(0.5, abs=0.05)
+    assert np.mean(opening == 0.0) == pytest.approx(0.7, abs=0.05)
     assert (recess[opening < 0.0] <= 0.005).all()
-    assert {door.handle for door in doors} == {"lever", "knob", "bar", "none"}
-    assert np.mean([door.side == "left" for door in doors]) == pytest.approx(0.5, abs=0.15)
+    assert np.mean([door.side == "left" for door in doors]) == pytest.approx(0.5, abs=0.05)
+    for handle, share in SETTINGS.door.handle.items():
+        assert np.mean([door.handle == handle for door in doors]) == pytest.approx(share, abs=0.05)
+    values = np.array([door.values for door in doors])
+    low, high = model.model.limits.T
+    assert ((low <= values) & (values <= high)).all()
+    heights = 1.0 + values[:, 3] / 2.0 + values[:, 6]
+    low, high = SETTINGS.door.handle_height
+    assert np.mean((low - 1e-9 <= heights) & (heights <= high + 1e-9)) > 0.95  # else the model's
+
+
+def test_cameras_stand_where_the_settings_say() -> None:
+    where, both = SETTINGS.camera, []
+    for seed in range(60):
+        room = sample_room(seed, CAMERA, SETTINGS)
+        assert room.door is not None
+        pose = np.linalg.inv(room.wall) @ room.camera.pose
+        x, y, z = pose[:3, 3]
+        assert where.distance[0] <= np.hypot(x, y) <= where.distance[1]
+        assert where.aside[0] <= np.arctan2(y, -x) <= where.aside[1]
+        assert where.height[0] <= z <= where.height[1]
+        assert where.tilt[0] - 1e-9 <= np.arcsin(pose[2, 2]) <= where.tilt[1] + 1e-9
+        assert abs(np.arcsin(pose[2, 0])) <= where.roll[1] + 1e-9
+        u = [
+            (CAMERA.matrix @ (0.5 * (top + bottom)))[0] / (0.5 * (top + bottom))[2]
+            for top, bottom in (
+                (room.door.corners[f"top_{side}"], room.door.corners[f"bottom_{side}"])
+                for side in ("left", "right")
+            )
+        ]
+        both.append(u[0] > -60 and u[1] < 700)
+        assert u[0] < u[1]
+    assert np.mean(both) > 0.8
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -197,7 +220,7 @@ def test_every_kind_of_room_is_rendered(kind: str) -> None:
 
 def test_behind_glass_nothing_is_measured() -> None:
     lost = []
-    for seed in range(4):
+    for seed in range(6):
         frame = make_frame(seed, "none", "glass")
         names = np.array([body.name for body in frame.room.cuboids])
         glass = names[frame.images.bodies] == "glass"

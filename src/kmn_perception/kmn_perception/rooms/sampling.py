@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
+from zlib import crc32
 
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import RoomModel
@@ -70,7 +71,7 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
     kind
         One of ``KINDS``; the first five have a door.
     """
-    draw, model = Draw(seed, list(KINDS).index(kind)), _model(settings.model)
+    draw, model = Draw(seed, crc32(kind.encode())), _model(settings.model)
     design, where = draw_design(draw, model, settings.door), settings.camera
     if kind == "one_edge":
         where = where._replace(heading=settings.negatives.one_edge_heading)

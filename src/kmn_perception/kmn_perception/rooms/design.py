@@ -16,7 +16,18 @@ from kmn_perception.rooms.settings import DoorSettings
 
 SAMPLES = 101  # of an edge
 BESIDE = 0.01  # metres from an edge to where the panel is looked for
-BUILT_IN = ("panel", "handle", "fitting", "sign", "moulding", "post", "lintel", "wall", "seal")
+BUILT_IN = (
+    "panel",
+    "handle",
+    "fitting",
+    "sign",
+    "moulding",
+    "hinge",
+    "post",
+    "lintel",
+    "wall",
+    "seal",
+)
 CORNERS = {
     "top_left": (0.5, 0.5),
     "top_right": (-0.5, 0.5),

@@ -183,7 +183,7 @@ def on_panel(
     things: ThingsSettings,
     looks: LooksSettings,
 ) -> list[Cuboid]:
-    """Draw a sheet and mouldings on a panel of a size (3,), of which (4, 4) is the frame."""
+    """Draw what is on a panel of a size (3,), of which (4, 4) is the frame."""
     found, front = [], -size[0] / 2.0
     if draw.chance(things.sign):
         width, height = draw.between((0.15, 0.4)), draw.between((0.1, 0.6))
@@ -193,6 +193,11 @@ def on_panel(
         high = (front, y + width / 2.0, z + height / 2.0)
         look = printed(draw, draw.material(looks, looks.other), things, looks)
         found.append(cuboid("sign", low, high, look, panel))
+    if draw.chance(things.hinges):
+        look, half = draw.material(looks, looks.other), np.array(things.hinge_size) / 2.0
+        for share in things.hinge_heights:
+            middle = np.array([front, size[1] / 2.0 - half[1], share * size[2]])
+            found.append(cuboid("hinge", middle - half, middle + half, look, panel))
     if draw.chance(things.mouldings):
         side, depth = draw.between((0.12, 0.2)), draw.between((0.004, 0.012))
         inner = size[1] / 2.0 - side

@@ -141,6 +141,9 @@ class ThingsSettings(NamedTuple):
     sign: Fraction
     switch: Fraction
     mouldings: Fraction
+    hinges: Fraction
+    hinge_heights: tuple[Fraction, ...]
+    hinge_size: tuple[Positive, Positive, Positive]
     ceiling: Interval
     side_wall: Fraction
     side_distance: SideSettings

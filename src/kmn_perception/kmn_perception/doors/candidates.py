@@ -36,6 +36,10 @@ class Candidate(NamedTuple):
     confidence: float = np.nan
     proposals: Proposals | None = None
 
+    def edge(self, side: str) -> Line:
+        """Return the ``left`` or the ``right`` edge."""
+        return self.left if side == "left" else self.right
+
     @property
     def directions(self) -> tuple[float, float]:
         """Of left and right edge: metres to the right over the view's distance."""

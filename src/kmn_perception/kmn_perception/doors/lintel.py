@@ -68,11 +68,22 @@ def find_lintel(
     rows = evidence.astype(np.float32)
     peaks = np.flatnonzero((rows > 0.0) & (rows >= largest_near(rows)))
     if seen_to < low or not len(peaks):
-        return Lintel(None, np.inf, seen_to)
+        return Lintel(*_by_network(view, likely, settings), seen_to)
     best = peaks[rows[peaks].argmax()]
     weights = rows[peaks].astype(np.float64) ** 2
     spread = np.average((view.z[peaks] - view.z[best]) ** 2, weights=weights)
     return Lintel(float(view.z[best]), float(np.hypot(settings.noise, np.sqrt(spread))), seen_to)
+
+
+def _by_network(
+    view: WallView, likely: NDArray[np.float64] | None, settings: LintelSettings
+) -> tuple[float | None, float]:
+    """Return a top that the network alone sees, if it is sure of it, and its deviation."""
+    if likely is None or likely[:-1].max() < settings.sure:
+        return None, np.inf
+    return float(
+        np.average(view.z, weights=likely[:-1] >= 0.9 * likely[:-1].max())
+    ), settings.hint_noise
 
 
 def _likely(candidate: Candidate) -> NDArray[np.float64] | None:

@@ -29,6 +29,7 @@ from kmn_perception.doors.walls import Frame
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
+_STEP_NOISE = 0.012  # metres, of an edge that only depth or the network tell
 _UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
@@ -148,7 +149,7 @@ def _edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tuple[flo
     distance = view.frame.distance
     noise = settings.fit.edge_noise * float(view.footprint[line.column]) / distance
     if line.contrast == 0.0:
-        return float(view.s[line.column]) / distance, 3.0 * noise + 0.012 / distance
+        return float(view.s[line.column]) / distance, 3.0 * noise + _STEP_NOISE / distance
     position, spread = _subpixel(view, pieces, line, settings)
     return position / distance, float(np.hypot(noise, spread / distance))
 
@@ -159,7 +160,7 @@ def edge_spread(candidate: Candidate, side: str, settings: DoorSettings) -> floa
     Frame, panel and what stands beside them have edges side by side. Each counts by the square of
     its contrast and, with a network, by the probability that it is the door's.
     """
-    chosen = candidate.left if side == "left" else candidate.right
+    chosen = candidate.edge(side)
     pixel = float(candidate.view.s[1] - candidate.view.s[0])
     weights, offsets = [], []
     for line in candidate.lines:

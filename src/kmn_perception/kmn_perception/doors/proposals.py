@@ -88,6 +88,14 @@ def handle_of(candidate: Candidate) -> SeenHandle | None:
     return SeenHandle(kind, float(s), float(z), float(part.sum()))
 
 
+def edge_probability(candidate: Candidate, side: str) -> float:
+    """Return the network's probability of a candidate's ``left`` or ``right`` edge; 0 without."""
+    if candidate.proposals is None:
+        return 0.0
+    found = candidate.proposals.left if side == "left" else candidate.proposals.right
+    return near(found, round(cell_of(candidate.view, candidate.edge(side).column)))
+
+
 def near(probabilities: NDArray[np.float32], at: int, reach: int = 2) -> float:
     """Return the probability of the columns about one of them."""
     last = len(probabilities) - 1  # that there is none

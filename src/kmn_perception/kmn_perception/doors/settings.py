@@ -153,12 +153,26 @@ class HandleSettings:
 
 @dataclass(frozen=True)
 class LintelSettings:
-    """The top of the door: heights at which it is sought, metres, and what shows it."""
+    """The top of the door.
+
+    Attributes
+    ----------
+    heights
+        At which it is sought, metres above the floor.
+    min_coverage, min_contrast
+        Share of its visible pieces that must show it, by such a step of the logarithm of grey.
+    noise
+        Standard deviation of its height, metres.
+    sure, hint_noise
+        Probability from which on the network alone tells it, and its deviation then, metres.
+    """
 
     heights: Interval
     min_coverage: Fraction
     min_contrast: Positive
     noise: Positive
+    sure: Fraction
+    hint_noise: Positive
 
 
 @dataclass(frozen=True)
@@ -173,6 +187,8 @@ class VerdictSettings:
         Share of an edge's visible pieces that show it.
     min_step
         Or the step in depth, standard deviations.
+    sure
+        Or the network's probability of that edge.
     min_panel
         Share of the panel's unhidden measurements that lie on it.
     min_visible
@@ -189,6 +205,7 @@ class VerdictSettings:
     height: Interval
     min_coverage: Fraction
     min_step: Positive
+    sure: Fraction
     min_panel: Fraction
     min_visible: Fraction
     min_confidence: Fraction

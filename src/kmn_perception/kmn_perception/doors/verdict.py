@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.geometry import DOOR, HANDLE_INSET
-from kmn_perception.doors.lines import Line
+from kmn_perception.doors.geometry import DOOR, HANDLE_INSET, WIDTH
 from kmn_perception.doors.measuring import Measurement
+from kmn_perception.doors.proposals import edge_probability
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
@@ -76,23 +76,27 @@ def _score(found: Measurement, settings: DoorSettings) -> float:
 def _refusal(found: Measurement, settings: DoorSettings) -> str:
     """Return why the candidate is no door, or nothing."""
     verdict, surfaces = settings.verdict, found.surfaces
-    lines = found.candidate.left, found.candidate.right
-    for line, side in zip(lines, ("left", "right"), strict=True):
-        if not _is_edge(line, settings):
+    by_depth = False
+    for side in ("left", "right"):
+        line = found.candidate.edge(side)
+        probability = edge_probability(found.candidate, side)
+        if line.coverage >= verdict.min_coverage or probability >= verdict.sure:
+            continue
+        if abs(line.step) < verdict.min_step:
             return (
                 f"the {side} edge shows in {100 * line.coverage:.0f} % of its height and a step of "
                 f"{abs(line.step):.1f} standard deviations"
             )
-    if not all(line.coverage >= verdict.min_coverage for line in lines):
-        recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
-        if surfaces.opening == 0.0 and abs(recess) < verdict.min_step * deviation:
-            return (
-                f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
-                f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
-            )
+        by_depth = True
+    recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+    if by_depth and surfaces.opening == 0.0 and abs(recess) < verdict.min_step * deviation:
+        return (
+            f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
+            f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
+        )
     low, high = verdict.width
-    width = 0.8 + found.values[4]
-    if not low <= width <= high:
+    width, slack = WIDTH + found.values[4], 2.0 * np.sqrt(found.covariance[4, 4])
+    if not low - slack <= width <= high + slack:
         return f"the edges are {width:.2f} m apart, doors are {low:g} to {high:g} m wide"
     if surfaces.panel_visible < verdict.min_visible:
         return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
@@ -125,11 +129,6 @@ def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
     recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
     deep = recess > settings.verdict.min_step * deviation
     return found.surfaces.opening != 0.0 or bool(deep and not confidence < _UNLIKELY)
-
-
-def _is_edge(line: Line, settings: DoorSettings) -> bool:
-    verdict = settings.verdict
-    return line.coverage >= verdict.min_coverage or abs(line.step) >= verdict.min_step
 
 
 def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:

@@ -193,8 +193,10 @@ class VerdictSettings:
         Share of the panel's unhidden measurements that lie on it.
     min_visible
         Share of the panel that must be in view and unhidden.
+    min_probability
+        Of each edge, by the network where there is one.
     min_confidence
-        Probability of its edges, by the network, that makes a door without recess and handle.
+        Probability of both edges, by the network, that makes a door without recess and handle.
     max_edge_deviation
         Of an edge whose place is known, metres.
     rival
@@ -208,6 +210,7 @@ class VerdictSettings:
     sure: Fraction
     min_panel: Fraction
     min_visible: Fraction
+    min_probability: Fraction
     min_confidence: Fraction
     max_edge_deviation: Positive
     rival: NonNegative

@@ -13,8 +13,6 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
 
-_UNLIKELY = 0.02  # of the network's probability of the edges
-
 
 def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     """Return the estimate of a measured candidate, with what it is worth."""
@@ -115,20 +113,26 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
 
 def _doubt(found: Measurement, settings: DoorSettings) -> str:
     """Return which edge is not known well enough, or nothing."""
+    verdict = settings.verdict
     for side, deviation in zip(("left", "right"), found.edge_deviations, strict=True):
-        if deviation > settings.verdict.max_edge_deviation:
+        if deviation > verdict.max_edge_deviation:
             return f"several lines may be the {side} edge: it is known to {1e3 * deviation:.0f} mm"
+        probability = edge_probability(found.candidate, side)
+        if found.candidate.proposals is not None and probability < verdict.min_probability:
+            return (
+                f"the {side} edge is a door's with a probability of {probability:.2f} only, "
+                f"expected {verdict.min_probability:g}"
+            )
     return ""
 
 
 def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
     """Return whether recess, opening or the network tell a door from a poster or a cupboard."""
-    confidence = found.candidate.confidence
-    if confidence >= settings.verdict.min_confidence:
+    if found.candidate.confidence >= settings.verdict.min_confidence:
         return True
     recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
-    deep = recess > settings.verdict.min_step * deviation
-    return found.surfaces.opening != 0.0 or bool(deep and not confidence < _UNLIKELY)
+    deep = bool(recess > settings.verdict.min_step * deviation)
+    return found.surfaces.opening != 0.0 or deep
 
 
 def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:

@@ -3,52 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
-from kmn_perception.scene.camera_pose import CameraPose, NoCameraPoseError, find_camera_pose
+from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
+from kmn_perception.scene.camera_pose import NoCameraPoseError, find_camera_pose
 from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.free_space import free_space, free_space_of_cloud, is_truncated
 from kmn_perception.scene.intrinsics import camera_as_dense
 from kmn_perception.scene.occlusion import find_occluded_pairs
-from kmn_perception.scene.segmentation import SegmentationSettings, Segments, segment
-from kmn_perception.scene.settings import SceneSettings
+from kmn_perception.scene.segmentation import Segments, segment
 from kmn_perception.scene.stacking import stands_on
-from kmn_perception.scene.support_plane import SupportPlaneSettings, find_support_plane
+from kmn_perception.scene.support_plane import find_support_plane
 
 MIN_PARTS = 3  # two parts of an object, and what is in front of them
-
-
-@dataclass(frozen=True, eq=False)
-class PipelineSettings:
-    """How a frame becomes objects in the world frame.
-
-    Attributes
-    ----------
-    camera_pose
-        The model's canonical one, the given one, or estimated from the support plane.
-    given_pose
-        (4, 4) optical frame in the world frame, metres.
-    plane
-        What counts as a support plane.
-    background
-        The stages of the background removal.
-    scene
-        How objects are told apart.
-    """
-
-    camera_pose: CameraPose
-    given_pose: NDArray[np.float64]
-    plane: SupportPlaneSettings
-    background: SegmentationSettings
-    scene: SceneSettings
 
 
 class ObjectView(NamedTuple):
@@ -69,15 +45,6 @@ class ObjectView(NamedTuple):
     truncated: bool
 
 
-class ObjectEstimate(NamedTuple):
-    """An estimate with what it rests on, see `ObjectView`."""
-
-    estimate: Estimate
-    observation: Observation
-    mask: NDArray[np.bool_]
-    truncated: bool
-
-
 class MorphPipeline:
     """Camera pose, background removal and estimation, one after the other.
 
@@ -89,6 +56,22 @@ class MorphPipeline:
 
     def __init__(self, estimator: MorphEstimator, settings: PipelineSettings) -> None:
         self.estimator, self.settings = estimator, settings
+
+    @property
+    def model(self) -> KinematicModel:
+        """What is estimated."""
+        return self.estimator.model
+
+    @property
+    def uses_image(self) -> bool:
+        """Grey values tell the network nothing."""
+        return False
+
+    def configured(self, settings: PipelineSettings, estimator: EstimatorSettings) -> MorphPipeline:
+        """Return the pipeline with other settings, which shares model and network."""
+        old = self.estimator
+        new = MorphEstimator(old.model, old.network, estimator, old.refinement)
+        return MorphPipeline(new, settings)
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
@@ -247,10 +230,10 @@ class MorphPipeline:
         self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]
     ) -> ObjectEstimate:
         """Refuse the estimate of an object that stands on another one."""
-        points, cubes = found.observation.points, self._bodies(found)
+        points, cubes = found.observation.points, self._found_bodies(found)
         stacking = self.settings.scene.stacking
         for other in objects:
-            if other is not found and stands_on(points, cubes, self._bodies(other), stacking):
+            if other is not found and stands_on(points, cubes, self._found_bodies(other), stacking):
                 reason = "the object stands on another one, not on the support plane"
                 status = Status.NOT_CONVERGED
                 return found._replace(
@@ -258,9 +241,13 @@ class MorphPipeline:
                 )
         return found
 
-    def _bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
-        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
-        estimate = found.estimate
-        if estimate.status is not Status.OK:
+    def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate, none where there are no parameters."""
+        if not np.isfinite([*estimate.theta, *estimate.gamma]).all():
             return np.empty((0, 4, 4))
-        return self.estimator.model.unit_cubes(estimate.theta, estimate.gamma)
+        return self.model.unit_cubes(estimate.theta, estimate.gamma)
+
+    def _found_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
+        holds = found.estimate.status is Status.OK
+        return self.bodies(found.estimate) if holds else np.empty((0, 4, 4))

@@ -27,7 +27,7 @@ from kmn_perception.estimator import Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points
-from kmn_perception.pipeline import PipelineSettings
+from kmn_perception.pipeline_interface import PipelineSettings
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient
 from kmn_perception.ros.parameters import declare_parameters

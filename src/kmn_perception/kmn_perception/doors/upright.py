@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.planes import Plane
-from kmn_perception.doors.settings import VerticalSettings
+from kmn_perception.doors.search_settings import VerticalSettings
 from kmn_perception.model.camera import Camera
 
 _REWEIGHTINGS = 12
-_UNDER, _FEW = 0.1, 0.15  # what is lower by this part of the height, and how much of it may be
+_UNDER, _FEW = 0.1, 0.4  # lower by this part of the height; how much of it reflections are
 _IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
@@ -35,12 +35,14 @@ def line_segments(
     """
     image = (np.clip(np.nan_to_num(grey), 0.0, 1.0) * 255.0).astype(np.uint8)
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(image)[0]
-    ends = np.empty((0, 4)) if found is None else found.reshape(-1, 4).astype(np.float64)
+    ends: NDArray[np.float64] = np.asarray(
+        [] if found is None else found, dtype=np.float64
+    ).reshape(-1, 4)
     length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
     ends, length = ends[length >= settings.min_segment], length[length >= settings.min_segment]
     normals = np.cross(camera.rays(ends[:, 0], ends[:, 1]), camera.rays(ends[:, 2], ends[:, 3]))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, settings.segment_noise / length
+    return np.asarray(normals, dtype=np.float64), settings.segment_noise / length
 
 
 def find_up(
@@ -87,6 +89,7 @@ def _least(information: NDArray[np.float64], guess: NDArray[np.float64]) -> NDAr
 def find_camera_height(
     blocks_up: NDArray[np.float64],
     inverse: NDArray[np.float64],
+    level: NDArray[np.bool_],
     noise: float,
     heights: tuple[float, float],
     min_blocks: int,
@@ -103,6 +106,8 @@ def find_camera_height(
         (N,) rays times the upward vector.
     inverse
         (N,) inverse depths of the same blocks, 1/m.
+    level
+        (N,) which of them may be a floor: those on no wall.
     max_deviation
         Of the height that a single block tells, as a fraction of it.
     """
@@ -111,6 +116,8 @@ def find_camera_height(
     deviation = noise / -blocks_up[below]
     low, high = 1.0 / heights[1], 1.0 / heights[0]
     told = deviation < max_deviation * over
+    everything = over[told], deviation[told]
+    told &= level[below]
     over, deviation = over[told], deviation[told]
     if not len(over):
         return None
@@ -128,7 +135,7 @@ def find_camera_height(
             near = np.abs(over - value) < 3.0 * (deviation + 0.005 * value)
             if near.sum() >= 3:
                 value = float(np.average(over[near], weights=deviation[near] ** -2.0))
-        under = over < (1.0 - _UNDER) * value - 3.0 * deviation
+        under = everything[0] < (1.0 - _UNDER) * value - 3.0 * everything[1]
         if under.sum() < _FEW * near.sum():
             return 1.0 / value
     return None

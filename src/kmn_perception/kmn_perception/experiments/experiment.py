@@ -25,7 +25,8 @@ from kmn_perception.network import weights
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.threads import use_one_thread
-from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError
 from kmn_perception.scene.depth_view import DepthView

@@ -9,13 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.door_finder import Frame
-from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines
-from kmn_perception.doors.planes import find_planes
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
-from kmn_perception.doors.wall_view import WallFrame, WallView, view_wall
+from kmn_perception.doors.wall_view import WallView
+from kmn_perception.doors.walls import Frame, NoWallError, find_walls
 from kmn_perception.experiments.doors.errors import DoorPlace
 
 Found = DoorPlace | None
@@ -65,28 +62,14 @@ def _strongest_pair(
 
 def _walls(frame: Frame, settings: DoorSettings) -> Iterator[Wall]:
     """Yield the walls in view."""
-    noise, generator = settings.fit.pixel_noise, np.random.default_rng(0)
-    blocks = Blocks.of(frame.depth, frame.camera, noise, settings.planes)
-    planes = find_planes(blocks, noise, settings.planes, generator)
-    if not planes:
+    noise = settings.fit.pixel_noise
+    try:
+        walls = find_walls(frame, settings, np.random.default_rng(0))
+    except NoWallError:
         return
-    segments = None
-    if frame.grey is not None:
-        segments = line_segments(frame.grey, frame.camera, settings.vertical)
-    up = find_up(planes, segments, settings.vertical)
-    floor, (rays, inverse, valid) = settings.floor, blocks.flat()
-    height = find_camera_height(
-        *(rays[valid] @ up, inverse[valid], noise),
-        *(floor.heights, floor.min_blocks, floor.max_deviation),
-    )
-    before, behind = settings.view.before * noise, settings.view.behind * noise
-    for plane in planes:
-        if abs(plane.normal @ up) >= np.sin(settings.vertical.max_wall_tilt):
-            continue
-        wall = WallFrame.of(plane.vector, up, height or settings.prior.handle_height[0])
-        view = view_wall(wall, frame.depth, frame.grey, frame.camera, settings.view)
-        if view is not None:
-            yield Wall(view, cut_to_pieces(view, before, behind, settings.lines))
+    for view in walls.views:
+        before, behind = settings.view.before * noise, settings.view.behind * noise
+        yield Wall(view, cut_to_pieces(view, before, behind, settings.lines))
 
 
 def _place(view: WallView, left: Line, right: Line) -> DoorPlace:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kmn_perception.doors.door_estimate import DoorEstimate
-from kmn_perception.doors.door_finder import DoorFinder, Frame
+from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.walls import Frame
 from kmn_perception.experiments.doors.baselines import BASELINES
 from kmn_perception.experiments.doors.errors import DoorErrors, DoorPlace, compare, errors
 from kmn_perception.experiments.doors.frames import DoorFrame

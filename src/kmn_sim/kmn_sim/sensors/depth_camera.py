@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
 from kmn_sim.sensors.kinect import Kinect
+from kmn_sim.world.renderer import Picture
 from kmn_sim.world.simulation import Simulation
 
 
@@ -36,5 +37,11 @@ class DepthCamera:
 
     def capture(self, simulation: Simulation) -> NDArray[np.float32]:
         """Return the depth image (height, width) at present, metres, NaN for none."""
-        exact = simulation.renderer.render(self.camera(simulation)).depth
-        return exact if self._kinect is None else self._kinect.measure(exact, self._camera.fx)
+        return self.expose(simulation).depth
+
+    def expose(self, simulation: Simulation) -> Picture:
+        """Return the depth image at present, as measured, and the colours of the same pixels."""
+        picture = simulation.renderer.render(self.camera(simulation))
+        if self._kinect is None:
+            return picture
+        return picture._replace(depth=self._kinect.measure(picture.depth, self._camera.fx))

@@ -104,6 +104,7 @@ def test_furniture_is_never_in_the_way_of_robot_and_door() -> None:
             begin = pose[:2, :2] @ start + pose[:2, 3]
             width = MODEL.body("panel").size(gamma)[1]
             piece = drawn.furniture
+            assert piece.side == np.sign(MODEL.joints[0].origin(gamma)[1])
             edge = width / 2.0 + drawn.frame_width + piece.distance
             # A door that is open by 90 degrees stands on the hinge's side, within its frame.
             assert edge > width / 2.0 + 0.1

@@ -93,19 +93,19 @@ class Room:
         drawn = within(getattr(settings.recess, direction))
         frame, skirting = settings.frame, settings.skirting
         width, proud, height = map(within, (frame.width, frame.proud, skirting.height))
-        sides = generator.permutation([LEFT, RIGHT]).tolist()
+        side = float(generator.choice([LEFT, RIGHT]))
         hung, stood = settings.poster, settings.furniture
         poster = OnWall(
-            sides[0],
+            side,
             within(hung.distance),
             within(hung.bottom),
             (hung.proud, within(hung.width), within(hung.height)),
         )
         distance = within(stood.distance)
         size = (within(stood.depth), within(stood.width), within(stood.height))
-        places = [OnWall(side, distance, 0.0, size) for side in reversed(sides)]
+        # At the handle's side the robot stands.
+        furniture = OnWall(way.hinge, distance, 0.0, size)
         outer = way.half_width + settings.gap + width
-        free = [place for place in places if way.leaves(place, outer, stood.clear)]
         return cls(
             drawn if recess is None else recess,
             settings.gap,
@@ -114,7 +114,7 @@ class Room:
             settings.wall,
             (height, skirting.proud),
             poster,
-            free[0] if free else None,
+            furniture if way.leaves(furniture, outer, stood.clear) else None,
             _colours(settings.colours, generator),
         )
 
@@ -180,11 +180,14 @@ class Way(NamedTuple):
         (2,) in the object frame, metres.
     half_width
         Of the panel, metres.
+    hinge
+        Side of the panel at which the hinge is, ``LEFT`` or ``RIGHT``.
     """
 
     start: NDArray[np.float64]
     end: NDArray[np.float64]
     half_width: float
+    hinge: float
 
     @classmethod
     def of(
@@ -195,7 +198,8 @@ class Way(NamedTuple):
         inverse = np.linalg.inv(model.transformation.matrix(theta))
         origin = inverse[:2, :2] @ np.array(start) + inverse[:2, 3]
         panel, handle = model.body("panel"), model.body("handle")
-        return cls(origin, handle.centre(gamma)[:2], float(panel.size(gamma)[1]) / 2.0)
+        side = float(np.sign(model.joints[0].origin(gamma)[1] - panel.centre(gamma)[1]))
+        return cls(origin, handle.centre(gamma)[:2], float(panel.size(gamma)[1]) / 2.0, side)
 
     def leaves(self, place: OnWall, edge: float, clear: float) -> bool:
         """Tell whether a thing is so far (m) from the way; ``edge``: where the frame ends (m)."""

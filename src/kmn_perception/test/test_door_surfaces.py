@@ -8,7 +8,15 @@ import pytest
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.surfaces import FLOOR, OFFSET, PANEL, WALL, angle, fit_surfaces
+from kmn_perception.doors.surfaces import (
+    FLOOR,
+    OFFSET,
+    PANEL,
+    WALL,
+    Surfaces,
+    angle,
+    fit_surfaces,
+)
 from kmn_perception.doors.upright import find_camera_height, find_up
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.model.camera import Camera
@@ -140,7 +148,9 @@ def recessed(yaw: float, recess: float, turn: float = 0.0) -> np.ndarray:
 EDGES = (-0.45 / 2.0, 0.45 / 2.0)
 
 
-def fit(depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offset):
+def fit(
+    depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offset
+) -> Surfaces:
     frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
     calibration = SETTINGS.calibration._replace(offset=offset)
     surfaces = fit_surfaces(blocks_of(depth), frame, EDGES, True, calibration, SETTINGS.fit)
@@ -149,7 +159,8 @@ def fit(depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offs
 
 
 def distances(values: np.ndarray) -> tuple[float, float]:
-    return 1.0 / np.linalg.norm(values[WALL]), 1.0 / np.linalg.norm(values[PANEL])
+    near, far = (float(1.0 / np.linalg.norm(values[part])) for part in (WALL, PANEL))
+    return near, far
 
 
 @pytest.mark.parametrize("recess", [0.0, 0.03, 0.12])

@@ -42,12 +42,31 @@ def handles(kind: str, lever: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     }[kind]
 
 
-def estimate(kind: str, values: NDArray[np.float64], noise: str, seed: int) -> ObjectEstimate:
-    """Return what is found of a door with such a handle."""
+def frame(panel: NDArray[np.float64], proud: float) -> list[NDArray[np.float64]]:
+    """Return posts and lintel of 6 cm, 4 mm from a panel (4, 4) and ``proud`` metres before it."""
+    side, gap = 0.06, 0.004
+    thickness, width, height = panel.diagonal()[:3] + [proud, 2.0 * gap, gap]
+    across, x = 0.5 * (width + side), -0.5 * proud
+    posts = [
+        cuboid((thickness, side, height + side), (x, y, 0.5 * (height + side)))
+        for y in (-across, across)
+    ]
+    return [*posts, cuboid((thickness, width, side), (x, 0.0, height + 0.5 * side))]
+
+
+def estimate(
+    kind: str,
+    values: NDArray[np.float64],
+    noise: str,
+    seed: int,
+    proud: float | None = None,
+) -> ObjectEstimate:
+    """Return what is found of a door with such a handle, and with a frame that is so far proud."""
     model = pipeline().estimator.model
     theta, gamma = model.split(values)
     panel, lever = model.unit_cubes(np.zeros(len(theta)), gamma)
-    cubes = np.stack([panel, *handles(kind, lever)])
+    around = [] if proud is None else frame(panel, proud)
+    cubes = np.stack([panel, *handles(kind, lever), *around])
     depth = render(model.transformation.matrix(theta) @ cubes, model.camera)
     depth = add_noise(depth, noise, np.random.default_rng(seed))
     return pipeline().estimate_all(DepthView.of_depth(depth, model.camera), 1)[0]
@@ -85,3 +104,18 @@ def test_a_handle_out_of_view_is_not_judged_but_unknown() -> None:
     deviations = np.sqrt(np.diag(found.estimate.covariance))
     assert deviations[HANDLE_Y] > 0.01
     assert deviations[HANDLE_Z] > 0.02
+
+
+@pytest.mark.parametrize("noise", ["none", "kinect"])
+def test_a_frame_before_the_panel_is_not_taken_for_a_part_of_it(noise: str) -> None:
+    for seed, values in enumerate(doors()):
+        assert estimate("lever", values, noise, seed, proud=0.02).estimate.status is not Status.OK
+
+
+@pytest.mark.parametrize("noise", ["none", "kinect"])
+def test_a_flush_frame_is_noticed_by_the_place_of_the_handle(noise: str) -> None:
+    """Unless the handle is so near the panel's edge that a wider panel explains it as well."""
+    values = np.array([0.3, 0.1, 0.2, 0.0, -0.1, 0.02, 0.0])
+    found = estimate("lever", values, noise, 0, proud=0.0).estimate
+    assert found.status is not Status.OK
+    assert "handle" in found.reason

@@ -1,4 +1,4 @@
-"""Whether the observation supports each body of a fit: what should stand out, and what does."""
+"""Whether the observation supports a fit: each body is where it is seen, and nothing else is."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ from kmn_perception.refinement.solids import (
 from kmn_perception.refinement.support_settings import SupportSettings
 
 GRID = 16  # samples along each side of a body's rectangle
-UNKNOWN, BODY, OTHER = range(3)  # where the model has the body, or others, at about that depth
+UNKNOWN = -1  # in place of a body's number
 
 
-class Support(NamedTuple):
-    """What is seen of a body that stands before others.
+class Residuals(NamedTuple):
+    """How far what is measured stands out from the model, where that is little.
 
     Attributes
     ----------
-    area
-        Pixels that it covers before the others, also where they are out of view.
+    bodies
+        (rows, columns) of the image's part with the model: which body it has there; `UNKNOWN` where
+        there is none, nothing is measured, or something else is.
+    sums, counts
+        (rows + 1, columns + 1) integral images of the distances, metres along the optical axis to
+        the first order, and of the pixels that have one.
     missing
-        Those of them that show something else, or are seen to be empty.
-    unexplained
-        Pixels elsewhere on the model from which something stands out as far as the body does, less
-        those that lie as far behind: noise does both.
+        (B,) pixels of each body that show something far behind it, or are seen to be empty.
     """
 
-    area: float
-    missing: int
-    unexplained: int
+    bodies: NDArray[np.int8]
+    sums: NDArray[np.float64]
+    counts: NDArray[np.float64]
+    missing: NDArray[np.int64]
 
 
 def unsupported(problem: Problem, values: NDArray[np.float64], names: Sequence[str]) -> str:
-    """Return which body the observation contradicts, and how; empty if it contradicts none.
+    """Return what the observation contradicts in a fit, and how; empty if nothing.
 
     A body of which nothing is measured is not contradicted: that it is unknown is for the
     covariance to say.
@@ -58,31 +60,33 @@ def unsupported(problem: Problem, values: NDArray[np.float64], names: Sequence[s
         Of the bodies.
     """
     settings, solids = problem.settings.support, problem.view(values).solids
+    residuals = residuals_of(solids, problem.image, settings)
+    unexplained = ""
     for body, name in enumerate(names):
-        found = support_of(solids, problem.image, settings, body)
-        if found.area < settings.min_pixels:
+        area, rise = _area_and_rise(solids, body)
+        if rise == 0.0 or area < settings.min_pixels:
             continue
-        if found.missing > settings.max_missing * found.area:
-            share = found.missing / found.area
-            return f"the {name} is not seen where the fit has it: {min(share, 1.0):.0%} of it is missing"
-        if found.unexplained > settings.max_unexplained * found.area:
-            share = found.unexplained / found.area
-            return f"what stands out is no {name}: {share:.0%} of its area stand out beside it"
-    return ""
+        sides = solids[body, [RIGHT, BOTTOM]] - solids[body, [LEFT, TOP]]
+        radius = int(0.5 * settings.averaged * sides.min())
+        missing, beside = _compare(residuals, body, settings.distinct * rise, radius)
+        if missing > settings.max_missing * area:
+            share = min(missing / area, 1.0)
+            return f"the {name} is not seen where the fit has it: {share:.0%} of it is missing"
+        if beside > settings.max_unexplained * area:
+            share = beside / area
+            unexplained = f"what stands out is no {name}: {share:.0%} of its area is beside it"
+    share = _relief(residuals, settings)
+    if share > settings.max_relief:
+        relief = f"more than {settings.relief:g} m before or behind the model"
+        return f"{share:.0%} of what is seen lies {relief}: it is of another shape"
+    return unexplained
 
 
 @njit(cache=True, error_model="numpy")
-def support_of(
-    solids: NDArray[np.float64], image: InverseDepthImage, settings: SupportSettings, body: int
-) -> Support:
-    """Compare a body with what is seen there, and the others with what stands out from them.
-
-    Depths are averaged over a part of the body, since a single one may be off by as much as the
-    body stands out. Distances along the optical axis are taken to the first order.
-    """
-    area, rise = _area_and_rise(solids, body)
-    if area == 0.0:
-        return Support(0.0, 0, 0)
+def residuals_of(
+    solids: NDArray[np.float64], image: InverseDepthImage, settings: SupportSettings
+) -> Residuals:
+    """Compare the pixels in which the model is with what is measured there."""
     height, width = image.inverse_depth.shape
     left = int(np.ceil(max(solids[:, LEFT].min(), 0.0)))
     right = int(np.floor(min(solids[:, RIGHT].max(), width - 1.0)))
@@ -90,71 +94,94 @@ def support_of(
     bottom = int(np.floor(min(solids[:, BOTTOM].max(), height - 1.0)))
     rows, columns = max(bottom - top + 1, 0), max(right - left + 1, 0)
     sums, counts = np.zeros((rows + 1, columns + 1)), np.zeros((rows + 1, columns + 1))
-    state = np.zeros((rows, columns), dtype=np.int8)
-    missing = 0
+    bodies = np.full((rows, columns), UNKNOWN, dtype=np.int8)
+    missing = np.zeros(solids.shape[0], dtype=np.int64)
     for i in range(rows):
         row_sum, row_count = 0.0, 0
         for j in range(columns):
             u, v = float(left + j), float(top + i)
-            predicted, entered, _ = raycast_any(solids, u, v)
+            predicted, body, _ = raycast_any(solids, u, v)
             seen = float(image.inverse_depth[top + i, left + j])
-            if image.farthest <= predicted <= image.nearest and predicted > 0.0:
-                before = entered == body and raycast_others(solids, body, u, v) > 0.0
-                if seen > 0.0:
-                    residual = (seen - predicted) / predicted**2
-                    if abs(residual) < settings.farthest * rise:
-                        state[i, j] = BODY if before else OTHER if entered != body else UNKNOWN
-                        row_sum += residual
-                        row_count += 1
-                    else:
-                        missing += before and residual < 0.0
-                elif before and not may_hide(
-                    image.occlusion, seen, image.interpolated[top + i, left + j], predicted
-                ):
-                    missing += 1
+            if body >= 0 and image.farthest <= predicted <= image.nearest:
+                residual = (seen - predicted) / predicted**2
+                if seen <= 0.0:
+                    missing[body] += not may_hide(
+                        image.occlusion, seen, image.interpolated[top + i, left + j], predicted
+                    )
+                elif abs(residual) < settings.something_else:
+                    bodies[i, j] = body
+                    row_sum += residual
+                    row_count += 1
+                else:
+                    missing[body] += residual < 0.0
             sums[i + 1, j + 1] = sums[i, j + 1] + row_sum
             counts[i + 1, j + 1] = counts[i, j + 1] + row_count
-    radius = int(settings.averaged * _short_side(solids, body) / 2.0)
-    unexplained = 0
+    return Residuals(bodies, sums, counts, missing)
+
+
+@njit(cache=True, error_model="numpy")
+def _mean(residuals: Residuals, row: int, column: int, radius: int) -> float:
+    """Return the mean distance over a square around a pixel that has one."""
+    rows, columns = residuals.bodies.shape
+    low, high = max(row - radius, 0), min(row + radius + 1, rows)
+    first, last = max(column - radius, 0), min(column + radius + 1, columns)
+    sums, counts = residuals.sums, residuals.counts
+    total = sums[high, last] - sums[low, last] - sums[high, first] + sums[low, first]
+    count = counts[high, last] - counts[low, last] - counts[high, first] + counts[low, first]
+    return float(total / count)
+
+
+@njit(cache=True, error_model="numpy")
+def _compare(residuals: Residuals, body: int, distinct: float, radius: int) -> tuple[int, int]:
+    """Return how many pixels of a body do not show it, and in how many others something stands out.
+
+    Depths are averaged over a square, since a single one may be off by as much as the body stands
+    out. Noise lets as many pixels stand out as lie behind, which are subtracted.
+    """
+    missing, unexplained = residuals.missing[body], 0
+    rows, columns = residuals.bodies.shape
     for i in range(rows):
-        low, high = max(i - radius, 0), min(i + radius + 1, rows)
         for j in range(columns):
-            if state[i, j] == UNKNOWN:
+            entered = residuals.bodies[i, j]
+            if entered == UNKNOWN:
                 continue
-            first, last = max(j - radius, 0), min(j + radius + 1, columns)
-            count = _within(counts, low, high, first, last)
-            residual = _within(sums, low, high, first, last) / count
-            if state[i, j] == BODY:
-                missing += residual < -settings.distinct * rise
-            elif abs(residual) > settings.distinct * rise:
-                unexplained += 1 if residual > 0.0 else -1
-    return Support(area, missing, unexplained)
+            mean = _mean(residuals, i, j, radius)
+            if entered == body:
+                missing += mean < -distinct
+            elif abs(mean) > distinct:
+                unexplained += 1 if mean > 0.0 else -1
+    return missing, unexplained
 
 
 @njit(cache=True, error_model="numpy")
-def _within(integral: NDArray[np.float64], low: int, high: int, first: int, last: int) -> float:
-    """Return the sum over rows low..high and columns first..last of an integral image."""
-    return float(
-        integral[high, last] - integral[low, last] - integral[high, first] + integral[low, first]
-    )
+def _relief(residuals: Residuals, settings: SupportSettings) -> float:
+    """Return the share of the pixels that stand out or lie deeper, with what noise does taken off.
 
-
-@njit(cache=True, error_model="numpy")
-def _short_side(solids: NDArray[np.float64], body: int) -> float:
-    """Return the shorter side of a body's rectangle in the image, pixels."""
-    return float(
-        min(solids[body, RIGHT] - solids[body, LEFT], solids[body, BOTTOM] - solids[body, TOP])
-    )
+    Noise does both alike; a frame or a deeper field does one.
+    """
+    count, higher, deeper = 0, 0, 0
+    rows, columns = residuals.bodies.shape
+    for i in range(rows):
+        for j in range(columns):
+            if residuals.bodies[i, j] != UNKNOWN:
+                mean = _mean(residuals, i, j, settings.relief_radius)
+                count += 1
+                higher += mean > settings.relief
+                deeper += mean < -settings.relief
+    return abs(higher - deeper) / max(count, 1)
 
 
 @njit(cache=True, error_model="numpy")
 def _area_and_rise(solids: NDArray[np.float64], body: int) -> tuple[float, float]:
-    """Return how many pixels a body covers before others, and how far it stands out, metres."""
+    """Return how many pixels show a body, in view or not, and how far it stands out, metres.
+
+    It stands out where other bodies are behind it; 0 if they are nowhere.
+    """
     wide = solids[body, RIGHT] - solids[body, LEFT]
     high = solids[body, BOTTOM] - solids[body, TOP]
-    count, rise = 0, 0.0
     if not np.isfinite(wide * high):
         return 0.0, 0.0
+    count, before, rise = 0, 0, 0.0
     for i in range(GRID):
         v = solids[body, TOP] + (i + 0.5) / GRID * high
         for j in range(GRID):
@@ -162,8 +189,9 @@ def _area_and_rise(solids: NDArray[np.float64], body: int) -> tuple[float, float
             nearest, entered, _ = raycast_any(solids, u, v)
             if entered != body:
                 continue
+            count += 1
             behind = raycast_others(solids, body, u, v)
             if behind > 0.0:
-                count += 1
+                before += 1
                 rise += (nearest - behind) / behind**2
-    return wide * high * count / GRID**2, rise / max(count, 1)
+    return wide * high * count / GRID**2, rise / max(before, 1)

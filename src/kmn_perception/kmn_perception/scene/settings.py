@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.settings import Count, Fraction, NonNegative, load_settings
@@ -104,11 +106,14 @@ class SceneSettings:
     ----------
     border_run
         Pixels at the image's border that a sensor may not measure at all.
+    max_gap
+        Pixels without a measurement that do not part an object.
     memory
         Frames for which an object that is not seen keeps its number.
     """
 
     border_run: Count
+    max_gap: Annotated[int, Field(ge=0)]
     memory: Count
     raised_plane: RaisedPlaneSettings
     concave_edges: ConcaveEdgeSettings

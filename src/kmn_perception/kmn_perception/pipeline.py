@@ -101,7 +101,7 @@ class MorphPipeline:
         for cloud in (points, points.reshape(-1, 3)):
             segment(cloud, model.camera.pose, np.zeros(3), split, scene)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
-        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
+        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0, (0.0, 0.0))
         mask = np.isfinite(points[..., 2])
         share_of_holes(points, labels, 1, scene.max_gap)
         is_truncated(mask, around.free_depth)
@@ -164,14 +164,17 @@ class MorphPipeline:
         """Return what is seen of objects in the pixels of a camera."""
         image = segments.labels.reshape(view.points.shape[:-1])
         to_camera = camera.world_to_camera @ to_world
-        border_run = self.settings.scene.border_run
-        around = free_space(view.points, image, to_camera, to_world, floor, border_run)
-        holes = share_of_holes(view.points, image, segments.objects, self.settings.scene.max_gap)
+        scene = self.settings.scene
+        shadow = camera.fx * scene.shadow.baseline, scene.shadow.slack
+        around = free_space(
+            view.points, image, to_camera, to_world, floor, scene.border_run, shadow
+        )
+        holes = share_of_holes(view.points, image, segments.objects, scene.max_gap)
         depth = view.depth()
         views = []
         for label in labels:
             mask = image == label
-            if holes[label] > 1.0 - self.settings.scene.intrinsics.dense:
+            if holes[label] > 1.0 - scene.intrinsics.dense:
                 observation = self._sparse(segments, label, camera, floor)
             else:
                 seen = np.where(mask, depth, np.float32(np.nan))

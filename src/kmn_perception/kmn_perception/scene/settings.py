@@ -98,6 +98,21 @@ class RaisedPlaneSettings:
     margin: Fraction
 
 
+class ShadowSettings(NamedTuple):
+    """Where a sensor cannot measure beside something near.
+
+    Attributes
+    ----------
+    baseline
+        Distance of its two viewpoints, metres; at least that of any sensor in use.
+    slack
+        Pixels by which the gap may be wider.
+    """
+
+    baseline: NonNegative
+    slack: NonNegative
+
+
 @dataclass(frozen=True)
 class SceneSettings:
     """All of the file.
@@ -114,6 +129,7 @@ class SceneSettings:
 
     border_run: Count
     max_gap: Annotated[int, Field(ge=0)]
+    shadow: ShadowSettings
     memory: Count
     raised_plane: RaisedPlaneSettings
     concave_edges: ConcaveEdgeSettings

@@ -16,6 +16,7 @@ from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError, find_camera_pose
+from kmn_perception.scene.connected_pixels import share_of_holes
 from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.free_space import free_space, free_space_of_cloud, is_truncated
 from kmn_perception.scene.intrinsics import camera_as_dense
@@ -81,10 +82,11 @@ class MorphPipeline:
         # At any angle that is not 0 the surface's rounding errors have concave edges.
         split = replace(self.settings.background, cluster=True, cluster_concave_angle=1e-9)
         for cloud in (points, points.reshape(-1, 3)):
-            segment(cloud, model.camera.pose, np.zeros(3), split, scene.concave_edges)
+            segment(cloud, model.camera.pose, np.zeros(3), split, scene)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
-        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
+        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0, (0.0, 0.0))
         mask = np.isfinite(points[..., 2])
+        share_of_holes(points, labels, 1, scene.max_gap)
         is_truncated(mask, around.free_depth)
         find_occluded_pairs([mask], around.free_depth, scene.occlusion.min_rows)
         self.estimator.warm_up()
@@ -124,7 +126,7 @@ class MorphPipeline:
         view = view.placed(pose, self.settings.scene.intrinsics)
         to_world = np.eye(4) if view.in_world else pose
         background, scene = self.settings.background, self.settings.scene
-        segments = segment(view.points, to_world, pose[:3, 3], background, scene.concave_edges)
+        segments = segment(view.points, to_world, pose[:3, 3], background, scene)
         sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
         too_small = sizes < self.estimator.settings.min_points
         labels = np.argsort(too_small, kind="stable")[:max_objects].tolist()
@@ -145,30 +147,38 @@ class MorphPipeline:
         """Return what is seen of objects in the pixels of a camera."""
         image = segments.labels.reshape(view.points.shape[:-1])
         to_camera = camera.world_to_camera @ to_world
-        border_run = self.settings.scene.border_run
-        around = free_space(view.points, image, to_camera, to_world, floor, border_run)
+        scene = self.settings.scene
+        shadow = camera.fx * scene.shadow.baseline, scene.shadow.slack
+        around = free_space(
+            view.points, image, to_camera, to_world, floor, scene.border_run, shadow
+        )
+        holes = share_of_holes(view.points, image, segments.objects, scene.max_gap)
         depth = view.depth()
         views = []
         for label in labels:
             mask = image == label
-            seen = np.where(mask, depth, np.float32(np.nan))
-            observation = Observation(segments.of_object(label), camera, floor, around, seen)
+            if holes[label] > 1.0 - scene.intrinsics.dense:
+                observation = self._sparse(segments, label, camera, floor)
+            else:
+                seen = np.where(mask, depth, np.float32(np.nan))
+                observation = Observation(segments.of_object(label), camera, floor, around, seen)
             views.append(ObjectView(observation, mask, is_truncated(mask, around.free_depth)))
         return views
 
     def _observe_cloud(
         self, segments: Segments, label: int, pose: NDArray[np.float64], floor: float
     ) -> ObjectView:
-        """Return what is seen of an object among unorganised points.
-
-        Its camera has the canonical view, and as many pixels as the points are dense.
-        """
-        seen = segments.of_object(label)
+        """Return what is seen of an object among unorganised points, in the canonical view."""
         canonical = replace(self.estimator.model.camera, pose=pose)
-        sensor = camera_as_dense(seen, canonical, self.settings.scene.intrinsics)
+        observation = self._sparse(segments, label, canonical, floor)
+        return ObjectView(observation, segments.labels == label, False)
+
+    def _sparse(self, segments: Segments, label: int, camera: Camera, floor: float) -> Observation:
+        """Return what a camera of as many pixels as the points are dense sees of an object."""
+        seen = segments.of_object(label)
+        sensor = camera_as_dense(seen, camera, self.settings.scene.intrinsics)
         beside = free_space_of_cloud(segments.points, sensor, floor)
-        mask = segments.labels == label
-        return ObjectView(Observation(seen, sensor, floor, beside), mask, False)
+        return Observation(seen, sensor, floor, beside)
 
     def camera_pose(self, view: DepthView) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the optical frame in the world, see `find_camera_pose`."""
@@ -192,8 +202,9 @@ class MorphPipeline:
     def _joined(self, objects: list[ObjectEstimate]) -> list[ObjectEstimate]:
         """Join what an occluder divides in the image, if one model explains both parts."""
         around = objects[0].observation.free_space
-        if around is None or objects[0].mask.ndim != 2 or len(objects) < MIN_PARTS:
-            return objects  # unorganised points have no image in which anything divides them
+        sparse = any(found.observation.depth is None for found in objects)
+        if around is None or sparse or len(objects) < MIN_PARTS:
+            return objects  # sparse points have no image in which anything divides them
         owner = list(range(len(objects)))  # the first of the parts to which an object belongs
         pairs = find_occluded_pairs(
             [found.mask for found in objects],

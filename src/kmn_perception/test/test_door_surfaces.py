@@ -148,9 +148,7 @@ def recessed(yaw: float, recess: float, turn: float = 0.0) -> np.ndarray:
 EDGES = (-0.45 / 2.0, 0.45 / 2.0)
 
 
-def fit(
-    depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offset
-) -> Surfaces:
+def fit(depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offset) -> Surfaces:
     frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
     calibration = SETTINGS.calibration._replace(offset=offset)
     surfaces = fit_surfaces(blocks_of(depth), frame, EDGES, True, calibration, SETTINGS.fit)

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from kmn_perception.configuration.node_parameters import parameter_table
+from kmn_perception.configuration.resources import share_directory
+from kmn_perception.rooms.sampling import KINDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -25,9 +27,38 @@ def test_the_parameters_stand_there_as_they_are_stated(page: str) -> None:
     assert f"\n{parameter_table(node)}\n\n" in text, "make parameter-tables"
 
 
+def executables(package: str) -> set[str]:
+    """Return the names of a package's executables."""
+    return set(runpy.run_path(str(ROOT / f"src/{package}/{package}/executables.py"))["EXECUTABLES"])
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_every_executable_stands_there(page: str) -> None:
     _, package = PAGES[page]
-    table = runpy.run_path(str(ROOT / f"src/{package}/{package}/executables.py"))["EXECUTABLES"]
     text = (ROOT / page).read_text(encoding="utf-8")
-    assert set(table) <= set(re.findall(r"^\| `(\w+)", text, flags=re.MULTILINE))
+    assert executables(package) <= set(re.findall(r"^\| `(\w+)", text, flags=re.MULTILINE))
+
+
+def test_what_is_to_be_run_is_an_executable_and_has_its_environment() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *ROOT.glob("src/*/kmn_*/**/*.py")]
+    texts = [page.read_text(encoding="utf-8") for page in pages]
+    shown = {pair for text in texts for pair in re.findall(r"\./run (kmn_\w+) ([a-z]\w*)", text)}
+    assert shown >= {("kmn_perception", "replay"), ("kmn_skill", "plan_doors")}
+    assert [pair for pair in shown if pair[1] not in executables(pair[0])] == []
+    unset = [page for page, text in zip(pages, texts, strict=True) if "python -m kmn_" in text]
+    assert [page.name for page in unset if page.name != "__main__.py"] == []
+
+
+def test_the_shared_memory_that_a_process_takes_stands_there() -> None:
+    profile = (share_directory() / "config/fastdds.xml").read_text(encoding="utf-8")
+    (size,) = re.findall(r"<segment_size>(\d+)</segment_size>", profile)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    stated = re.search(r"needs (\d+) MiB of `/dev/shm` for each process", text)
+    assert stated is not None
+    assert int(stated[1]) * 2**20 == int(size)
+
+
+def test_every_kind_of_room_stands_there() -> None:
+    text = (ROOT / "docs/rooms.md").read_text(encoding="utf-8")
+    rows = "".join(re.findall(r"^\| (`.*?) \|", text, flags=re.MULTILINE))
+    assert set(re.findall(r"`(\w+)`", rows)) == set(KINDS)

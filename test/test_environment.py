@@ -42,6 +42,37 @@ def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
     assert f"libraries {tmp_path}/cuda\n" in ended.stdout
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "./run kmn_perception replay",
+        "make --silent --old-file=build --old-file=lint --old-file=.venv/.ready-simulation test",
+    ],
+)
+def test_programs_and_tests_start_without_another_ros(command: str, tmp_path: Path) -> None:
+    """The real ``run`` and Makefile start a stub that tells whose Python packages it would find."""
+    for file in ("run", "Makefile", "tools/environment.sh", "tools/executables.py"):
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / file, tmp_path / file)
+    listed = "src/kmn_perception/kmn_perception/executables.py"
+    stub = "install/kmn_perception/lib/kmn_perception/replay"
+    for file in (listed, stub, ".venv/bin/python", ".venv/ros", "install/setup.bash"):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).touch()
+    shutil.copy(ROOT / listed, tmp_path / listed)
+    (tmp_path / ".venv/ros").write_text("wheels")
+    for program in (stub, ".venv/bin/python"):
+        (tmp_path / program).write_text('#!/bin/sh\necho "packages: $PYTHONPATH"\n')
+        (tmp_path / program).chmod(0o755)
+    if command.startswith("./run"):
+        (tmp_path / "Makefile").write_text("build:\n\t@true\n")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/runpy.py").write_text("raise SystemExit('another ROS')")
+    ended = bash(command, tmp_path, PYTHONPATH=str(tmp_path / "other"), ROS_DISTRO="humble")
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.splitlines()[-1] == "packages: "
+
+
 @pytest.mark.parametrize("name", ["Tür", "two words"])
 def test_a_checkout_where_cmake_would_fail_is_refused_at_once(name: str, tmp_path: Path) -> None:
     tools = tmp_path / name / "tools"

@@ -19,6 +19,7 @@ from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.transformation import transform_points
+from kmn_perception.ros import reports
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 
 NAN, INF = float("nan"), float("inf")
@@ -235,6 +236,24 @@ def test_bad_depth_is_refused(client: Any, reason: str) -> None:
     alter_image(image)
     alter_info(info)
     assert_refused(client, client.ask_depth(image, info), reason, text)
+
+
+def test_a_status_that_lasts_is_logged_once(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reports, "WARNING_PERIOD", 0.0)  # only what changes holds warnings back
+
+    def told() -> int:
+        return sum(line.startswith("NO_OBJECT: ") for line in client.log)
+
+    before = told()
+    for frames in (3, 2):
+        for _ in range(frames):
+            cloud = good_cloud()
+            cloud_of(5.0)(cloud)  # outside the crop volume
+            assert client.ask(cloud).status == MorphingParameters.NO_OBJECT
+        assert_answers_well(client)
+    client.graph.wait_for(lambda: told() >= before + 2)
+    client.report()
+    assert told() == before + 2
 
 
 def test_bad_cloud_in_the_service_is_answered_with_the_reason(client: Any) -> None:

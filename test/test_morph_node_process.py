@@ -17,14 +17,10 @@ from programs import BROKEN_FILES, TIMEOUT, assert_file_is_refused, parameters, 
 COMMAND = [f"{get_package_prefix('kmn_perception')}/lib/kmn_perception/morph_node"]
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_node_ends_quietly_when_it_is_stopped(
-    graph: Any,
-    domain: int,
-    tmp_path: Path,
-    stop: signal.Signals,
-) -> None:
-    process = start(COMMAND, domain, folder=tmp_path)
+def run_until_it_reports(
+    graph: Any, process: subprocess.Popen[str], stop: signal.Signals = signal.SIGINT
+) -> str:
+    """Stop a node when it is at work, which must end well, and return what it printed."""
     watcher = graph.start(lambda context: Node("watcher", context=context))
     reports: list[DiagnosticArray] = []
     watcher.create_subscription(DiagnosticArray, "/diagnostics", reports.append, 10)
@@ -35,6 +31,26 @@ def test_node_ends_quietly_when_it_is_stopped(
     finally:
         process.kill()
     assert (process.returncode, "Traceback" in output) == (0, False), output
+    return output
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_node_ends_quietly_when_it_is_stopped(
+    graph: Any,
+    domain: int,
+    tmp_path: Path,
+    stop: signal.Signals,
+) -> None:
+    run_until_it_reports(graph, start(COMMAND, domain, folder=tmp_path), stop)
+
+
+def test_what_parameter_files_hold_in_vain_is_told(graph: Any, domain: int, tmp_path: Path) -> None:
+    (tmp_path / "misspelt.yaml").write_text("/**: {ros__parameters: {obects: all}}")
+    (tmp_path / "others.yaml").write_text("sim_node: {ros__parameters: {model: box}}")
+    files = ["--params-file", "misspelt.yaml", "--params-file", "others.yaml"]
+    output = run_until_it_reports(graph, start(COMMAND, domain, *files, folder=tmp_path))
+    assert "there is no parameter 'obects', its value is ignored; did you mean 'obj" in output
+    assert "others.yaml holds no parameters for /morph_node, but for /sim_node" in output
 
 
 def test_node_that_is_interrupted_while_it_starts_ends_quietly(domain: int, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,17 @@ OFFLINE = {  # programs that communicate, with what they need to get that far
     "demo_bag": ["--out", "demo"],
     "benchmark": ["--frames", "1"],
 }
+WRITING = [  # programs and their arguments that name what is written
+    *(("kmn_perception", name, "--out") for name in ("make_example_bag", "demo_bag", "results")),
+    *(("kmn_perception", name, "--json") for name in ("evaluate", "evaluate_frames", "benchmark")),
+    *(("kmn_sim", name, "--json") for name in ("check_perception", "check_noise", "benchmark")),
+    ("kmn_sim", "snapshot", "--out"),
+    ("kmn_skill", "demo", "--out"),
+    ("kmn_skill", "evaluate", "--json"),
+    ("kmn_skill", "evaluate", "--strip"),
+    ("kmn_skill", "plan_doors", "--json"),
+    ("kmn_skill", "make_prototypes", "file"),
+]
 
 
 def run(
@@ -110,6 +122,27 @@ def test_an_unknown_executable_is_answered_with_those_there_are(tmp_path: Path) 
     assert all(name in ended.stderr for name in executables.EXECUTABLES)
 
 
+@pytest.mark.parametrize(("package", "name", "option"), WRITING)
+def test_where_nothing_can_be_written_is_said_before_the_work(
+    package: str,
+    name: str,
+    option: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("robotic")
+    (tmp_path / "file").touch()
+    arguments = [option] if option.startswith("-") else []
+    monkeypatch.setattr(sys, "argv", [name, *arguments, f"{tmp_path}/file/below", "--unknown"])
+    module, _ = import_module(f"{package}.executables").EXECUTABLES[name]
+    with pytest.raises(SystemExit) as ended:
+        import_module(module).main()
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert f"error: argument {option}: {tmp_path}/file/below is not a " in said
+
+
 def test_a_missing_package_is_named_with_the_target_that_installs_it(tmp_path: Path) -> None:
     (tmp_path / "pybullet.py").write_text("raise ModuleNotFoundError(name='pybullet')")
     path = f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"
@@ -183,3 +216,19 @@ def test_the_compile_cache_is_writable_and_changes_with_names_of_modules_and_cla
     monkeypatch.setenv("NUMBA_CACHE_DIR", "mine")
     choose_compile_cache(sources)
     assert os.environ["NUMBA_CACHE_DIR"] == "mine"
+
+
+@pytest.mark.parametrize("package", ["kmn_perception", "kmn_sim", "kmn_skill"])
+def test_programs_compile_into_a_folder_that_can_be_written(package: str, tmp_path: Path) -> None:
+    """As another user than the one who has installed them, whose HOME cannot be written."""
+    unset = dict.fromkeys(("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"), "")
+    ended = subprocess.run(
+        [sys.executable, "-c", f"import {package}.__main__, numba; print(numba.config.CACHE_DIR)"],
+        env={**os.environ, **unset, "HOME": "/proc/nowhere", "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert Path(ended.stdout.strip()).is_relative_to(tmp_path), ended.stdout

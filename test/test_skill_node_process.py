@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from kmn_msgs.action import OpenDoor
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
 from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
@@ -60,6 +64,21 @@ def test_a_destroyed_node_offers_its_action_no_more(graph: Any) -> None:
         assert action.wait_for_server(60.0)
     graph.wait_for(lambda: not action.server_is_ready())
     action.destroy()
+
+
+def test_its_planner_has_the_model_that_it_is_given(graph: Any, tmp_path: Path) -> None:
+    """Of which the policy needs a body ``handle``, as the shipped door has it and this one not."""
+    values = yaml.safe_load(resources.find("config/models", "door").read_text())
+    values["bodies"]["flap"] = values["bodies"].pop("handle")
+    values["joints"]["handle"]["body"] = "flap"
+    file = tmp_path / "other.yaml"
+    file.write_text(yaml.safe_dump(values, sort_keys=False))
+    given = [Parameter("model", value=str(file))]
+    with (
+        pytest.raises(ConfigurationError, match="'door' must have .* move: panel, flap"),
+        graph.running(SkillNode, parameter_overrides=given),
+    ):
+        pass
 
 
 @pytest.mark.parametrize(

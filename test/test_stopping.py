@@ -21,6 +21,23 @@ NODES = {
     "skill_node": ("kmn_skill", "opening doors"),
 }
 TIMES = 3
+WORKING = """
+import time
+from rclpy.node import Node
+from kmn_perception.ros.node_program import run_node
+
+class Working(Node):
+    def __init__(self):
+        super().__init__("working")
+        self.create_timer(0.01, self.work)
+
+    def work(self):
+        print("at work", flush=True)
+        time.sleep(0.3)
+        self.get_node_names()  # raises where the signal has shut the context down
+
+raise SystemExit(run_node("morph_node", "", Working))
+"""
 
 
 def burn() -> None:
@@ -68,3 +85,17 @@ def test_nodes_stop_quietly_at_any_moment(node: str, busy: int, domain: int) -> 
             finally:
                 process.kill()
             assert (process.returncode, "Traceback" in rest) == (0, False), rest
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_callback_that_is_at_work_may_communicate_to_its_end(
+    number: signal.Signals, domain: int
+) -> None:
+    process = start([sys.executable, "-c", WORKING], domain)
+    try:
+        read_until("at work", process)
+        process.send_signal(number)
+        rest, _ = process.communicate(timeout=TIMEOUT)
+    finally:
+        process.kill()
+    assert (process.returncode, "Traceback" in rest) == (0, False), rest

@@ -199,10 +199,14 @@ def test_round_things_are_no_boxes() -> None:
 def test_frames_without_an_object_have_a_reason(real_frame: RealFrame) -> None:
     empty = np.where((real_frame.labels > 1)[..., None], np.nan, real_frame.points)
     turned = real_frame.points[::-1, ::-1] * np.array([-1.0, -1.0, 1.0])
+    x, y, z = np.moveaxis(real_frame.points, -1, 0)
+    on_right, on_left = np.stack([y, -x, z], axis=-1), np.stack([-y, x, z], axis=-1)
     nowhere = np.where((real_frame.labels == 1)[..., None], np.nan, real_frame.points)
     for points, reason in (
         (empty, "no points of an object"),
         (turned, "the camera is upside down"),
+        (np.rot90(on_right), "the camera lies on its right side (portrait)"),
+        (np.rot90(on_left, -1), "the camera lies on its left side (portrait)"),
         (nowhere * np.nan, "no support plane"),
     ):
         (none,) = pipeline().estimate_all(DepthView(points.astype(np.float32)))

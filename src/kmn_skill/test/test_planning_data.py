@@ -88,6 +88,16 @@ def test_a_model_without_a_handle_is_refused() -> None:
         PlanningSetup.load(KinematicModel.load("box_a"))
 
 
+def test_a_model_whose_second_joint_moves_another_body_is_refused(tmp_path: Path) -> None:
+    def rename(values: dict[str, Any]) -> None:
+        values["bodies"]["flap"] = values["bodies"].pop("handle")
+        values["joints"]["handle"]["body"] = "flap"
+
+    model = KinematicModel.load(edited("config/models", "door", rename, tmp_path))
+    with pytest.raises(ConfigurationError, match="second moves 'handle'; .* move: panel, flap"):
+        PlanningSetup.load(model)
+
+
 def test_solutions_for_other_joints_are_refused_with_both() -> None:
     setup = PlanningSetup.load(DOOR)
     solutions = replace(Prototypes.load(), joints=("slide", *setup.joint_names[1:]))

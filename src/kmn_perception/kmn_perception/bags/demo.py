@@ -21,6 +21,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.bags.example_bag import CAMERA, load_frames, make_example_bag
 from kmn_perception.bags.replay import Replay
+from kmn_perception.command_line.arguments import output_folder
 from kmn_perception.configuration import resources
 from kmn_perception.estimator import Status
 from kmn_perception.model.camera import Camera
@@ -239,7 +240,10 @@ def main() -> int:
     """Run the executable ``demo_bag``."""
     parser = argparse.ArgumentParser(prog="demo_bag", description=__doc__)
     parser.add_argument(
-        "--out", type=Path, default=Path("outputs/demo"), help="folder of the bag and the pictures"
+        "--out",
+        type=output_folder,
+        default=Path("outputs/demo"),
+        help="folder of the bag and the pictures",
     )
     options = parser.parse_args(own_arguments())
     with ros_session("demo_bag"):

@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from kmn_perception.bags.replay import positive_number
 from kmn_perception.bags.rosbag2 import BagError, Message, write_bag
+from kmn_perception.command_line.arguments import output_folder
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.depth_image import read_depth_image
@@ -76,7 +77,7 @@ def main() -> int:
     """Run the executable ``make_example_bag``."""
     parser = argparse.ArgumentParser(prog="make_example_bag", description=__doc__)
     parser.add_argument(
-        "--out", type=Path, default=Path("outputs/kinect_boxes"), help="folder to make"
+        "--out", type=output_folder, default=Path("outputs/kinect_boxes"), help="folder to make"
     )
     parser.add_argument(
         "--rate", type=positive_number, default=2.0, help="frames a second (default 2)"
@@ -85,7 +86,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         make_example_bag(options.out, options.rate, options.storage)
-    except BagError as error:
+    except (BagError, OSError) as error:
         print(f"make_example_bag: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -10,16 +10,31 @@ import numpy as np
 from kmn_perception.doors.lines import Line, Pieces
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
+from kmn_perception.network.wall_network import Proposals
 
 
 class Candidate(NamedTuple):
-    """Two edges of a view, and a score; the larger, the more it looks like a door."""
+    """Two edges of a view.
+
+    Attributes
+    ----------
+    score
+        The larger, the more it looks like a door.
+    lines
+        All upright edges of the view.
+    confidence, proposals
+        The network's probability of these edges, and what else it proposes; NaN and None without a
+        network.
+    """
 
     score: float
     view: WallView
     pieces: Pieces
     left: Line
     right: Line
+    lines: Sequence[Line]
+    confidence: float = np.nan
+    proposals: Proposals | None = None
 
     @property
     def directions(self) -> tuple[float, float]:
@@ -40,13 +55,13 @@ def find_candidates(
         for right in lines[i + 1 :]:
             width = (right.column - left.column) * pixel
             if narrow - slack <= width <= wide + slack:
-                score = _score(left, right, width, lines, pieces, pixel, settings)
-                found.append(Candidate(score, view, pieces, left, right))
+                score = score_of(left, right, width, lines, pieces, pixel, settings)
+                found.append(Candidate(score, view, pieces, left, right, lines))
     found.sort(key=lambda candidate: -candidate.score)
-    return _distinct(found, slack / pixel)[: settings.candidates]
+    return distinct(found, slack / pixel)[: settings.candidates]
 
 
-def _distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
+def distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
     """Keep, of pairs whose edges lie within so many pixels, the one with the clearest edges."""
     kept: list[Candidate] = []
     for candidate in candidates:
@@ -64,12 +79,14 @@ def _distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
 
 
 def _clarity(candidate: Candidate) -> float:
+    if candidate.proposals is not None:
+        return candidate.score
     opposite = candidate.left.sign == -candidate.right.sign
     lines = (candidate.left, candidate.right)
     return sum(min(line.contrast, 1.0) + 0.05 * abs(line.step) for line in lines) * (1 + opposite)
 
 
-def _score(
+def score_of(
     left: Line,
     right: Line,
     width: float,

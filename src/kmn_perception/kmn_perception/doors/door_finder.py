@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,11 +16,13 @@ from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.planes import Plane, find_planes
+from kmn_perception.doors.proposals import with_proposals
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.wall_view import WallFrame, view_wall
 from kmn_perception.model.camera import Camera
+from kmn_perception.network.wall_network import WallNetwork
 
 _MAX_WALLS = 3
 
@@ -52,12 +55,14 @@ class DoorFinder:
 
     Attributes
     ----------
-    settings
-        May be replaced between two frames.
+    settings, network
+        May be replaced between two frames; without a network edges alone propose.
     """
 
-    def __init__(self, settings: DoorSettings, seed: int = 0) -> None:
-        self.settings, self.seed = settings, seed
+    def __init__(
+        self, settings: DoorSettings, network: WallNetwork | None = None, seed: int = 0
+    ) -> None:
+        self.settings, self.network, self.seed = settings, network, seed
 
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""
@@ -73,9 +78,11 @@ class DoorFinder:
             wrong = find_contradiction(planes, up, frame.height, settings)
             if wrong:
                 return DoorEstimate.none(wrong)
-        floor = self._camera_height(blocks, up) if frame.height is None else frame.height
-        height = settings.prior.handle_height[0] if floor is None else floor
         walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
+        floor = frame.height
+        if floor is None:
+            floor = self._camera_height(blocks, up, walls)
+        height = settings.prior.handle_height[0] if floor is None else floor
         if not walls:
             return DoorEstimate.none("no wall is seen")
         candidates = [
@@ -98,8 +105,11 @@ class DoorFinder:
         if not found:
             return DoorEstimate.none("no wall beside a panel is seen")
         best = self._best(found)
-        doubt = doubt_upright(best, planes, up, settings) if frame.up is None and best.found else ""
-        return DoorEstimate.none(doubt) if doubt else best
+        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
+            doubt = doubt_upright(best, planes, up, settings)
+            if doubt:
+                return DoorEstimate.none(doubt)
+        return best
 
     def _up(self, frame: Frame, planes: list[Plane]) -> NDArray[np.float64]:
         """Return the upward vector (3,) as it is given, or as the frame shows it."""
@@ -110,12 +120,19 @@ class DoorFinder:
             segments = line_segments(frame.grey, frame.camera, self.settings.vertical)
         return find_up(planes, segments, self.settings.vertical)
 
-    def _camera_height(self, blocks: Blocks, up: NDArray[np.float64]) -> float | None:
+    def _camera_height(
+        self, blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane]
+    ) -> float | None:
         settings = self.settings.floor
         rays, inverse, valid = blocks.flat()
+        level = np.ones_like(valid)
+        for wall in walls:
+            reach = self.settings.planes.inlier * self.settings.fit.pixel_noise
+            level &= np.abs(rays @ wall.vector - inverse) > reach
         return find_camera_height(
             rays[valid] @ up,
             inverse[valid],
+            level[valid],
             self.settings.fit.pixel_noise,
             settings.heights,
             settings.min_blocks,
@@ -133,7 +150,11 @@ class DoorFinder:
             return []
         before, behind = settings.view.before * noise, settings.view.behind * noise
         pieces = cut_to_pieces(view, before, behind, settings.lines)
-        return find_candidates(view, pieces, find_lines(pieces, settings.lines), settings)
+        lines = find_lines(pieces, settings.lines)
+        candidates = find_candidates(view, pieces, lines, settings)
+        if self.network is None:
+            return candidates
+        return with_proposals(candidates, view, pieces, lines, self.network, settings)
 
     def _best(self, found: list[DoorEstimate]) -> DoorEstimate:
         """Return the door that most speaks for, unless another one is as likely."""

@@ -79,7 +79,7 @@ def door_shape(m: NDArray[np.float64], handle_left: bool, ajar: bool) -> DoorSha
     over = np.array([0.5 * (m[5] + m[6]), 1.0])
     top = 1.0 / m[4] + m[9] / (wall @ over)
     height = 1.0 / m[4] + m[11] * grip[1]
-    return DoorShape(left, right, grip, height, top, turn if ajar else 0.0, recess)
+    return DoorShape(left, right, grip, height, top, turn, recess)
 
 
 def door_values(

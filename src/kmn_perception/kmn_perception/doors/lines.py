@@ -128,7 +128,7 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
         coverage = ((near > least) & known).sum(axis=0) / np.maximum(visible, 1)
         contrast = np.where(known, np.clip(sign * gradient, -1.0, 1.0), 0.0).sum(axis=0)
         contrast = (contrast / np.maximum(visible, 1)).astype(np.float32)
-        peak = (contrast >= _largest_near(contrast)) & (contrast > 0.6 * settings.min_contrast)
+        peak = (contrast >= largest_near(contrast)) & (contrast > 0.6 * settings.min_contrast)
         peak &= (visible >= settings.min_pieces) & (coverage >= settings.min_coverage)
         found += [
             Line(int(c), sign, float(contrast[c]), float(coverage[c]), float(pieces.step[c]))
@@ -143,7 +143,7 @@ def _steps_without_grey(
 ) -> list[Line]:
     """Return the steps in depth beside which grey shows no edge."""
     size = np.abs(pieces.step).astype(np.float32)
-    peak = (size >= _largest_near(size, 25)) & (size > settings.min_step)
+    peak = (size >= largest_near(size, 25)) & (size > settings.min_step)
     taken = [line.column for line in lines]
     return [
         Line(int(c), int(-np.sign(pieces.step[c])), 0.0, 0.0, float(pieces.step[c]))
@@ -213,6 +213,6 @@ def _sums(
     return total
 
 
-def _largest_near(values: NDArray[np.float32], size: int = 9) -> NDArray[np.float32]:
+def largest_near(values: NDArray[np.float32], size: int = 9) -> NDArray[np.float32]:
     """Return the largest value (less rounding) within a window about each."""
     return cv2.dilate(values[None], np.ones((1, size), np.uint8))[0] - np.float32(1e-6)

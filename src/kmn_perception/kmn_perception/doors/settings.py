@@ -128,6 +128,8 @@ class LineSettings:
         Standard deviation of a step of such strips, inverse depth, 1/m.
     min_step
         Steps of so many standard deviations are edges without any grey.
+    rivals
+        Lines closer to an edge than this may be the door's instead, metres.
     tie
         Lines closer than this may be the same edge: frame, reveal and panel, metres.
     """
@@ -144,6 +146,7 @@ class LineSettings:
     gap: Positive
     step_noise: Positive
     min_step: Positive
+    rivals: Positive
     tie: Positive
 
 
@@ -162,6 +165,7 @@ class ScoreSettings(NamedTuple):
     handle: float
     lintel: float
     no_lintel: float
+    network: float
 
 
 class Calibration(NamedTuple):
@@ -199,6 +203,8 @@ class FitSettings:
         Standard deviation of the vertical, radians.
     closed
         Standard deviation of a closed panel's angle to its wall, radians.
+    agree
+        Standard deviations of that angle within which wall and panel are taken to be parallel.
     ajar
         Angle to the wall from which a door is open, radians, and in standard deviations.
     min_blocks
@@ -218,9 +224,19 @@ class FitSettings:
     inlier: Positive
     tilt: Positive
     closed: Positive
+    agree: Positive
     ajar: tuple[float, float]
     min_blocks: Count
     edge_noise: Positive
+
+
+class TrustSettings(NamedTuple):
+    """What makes a handle: its contrast (of the logarithm of grey), and the ratio of it to that of
+    the panel's background and to that at the other edge."""
+
+    contrast: Positive
+    ratio: Positive
+    other: Positive
 
 
 @dataclass(frozen=True)
@@ -238,8 +254,13 @@ class HandleSettings:
         below it with which it is compared.
     inset
         Distances of its middle from the panel's edge, metres.
-    min_contrast, min_ratio, min_other
-        Of the logarithm of grey; its ratio to the panel's background; and to the other edge.
+    alone, doubted, confirmed
+        What it must show without a network, where the network sees none, and where it sees one.
+    min_probability, sure
+        Of the network's, from which on it sees a handle, and is right without any contrast.
+    hint_reach, hint_noise, bar_noise
+        Distance to the network's place within which the handle is sought; standard deviations of
+        that place, along and up; and up a vertical bar, metres.
     protrusion
         Of the handle's middle before the panel: value and standard deviation, metres.
     bump
@@ -252,9 +273,14 @@ class HandleSettings:
     reach: Positive
     inset: Interval
     bar: tuple[float, float, float]
-    min_contrast: Positive
-    min_ratio: Positive
-    min_other: Positive
+    alone: TrustSettings
+    doubted: TrustSettings
+    confirmed: TrustSettings
+    min_probability: Fraction
+    sure: Fraction
+    hint_reach: Positive
+    hint_noise: tuple[float, float]
+    bar_noise: Positive
     protrusion: tuple[float, float]
     bump: Positive
     along_noise: Positive
@@ -287,6 +313,8 @@ class VerdictSettings:
         Share of the panel's unhidden measurements that lie on it.
     min_visible
         Share of the panel that must be in view and unhidden.
+    max_edge_deviation
+        Of an edge whose place is known, metres.
     rival
         A different door within so much of the best one's score leaves the question open.
     """
@@ -297,7 +325,26 @@ class VerdictSettings:
     min_step: Positive
     min_panel: Fraction
     min_visible: Fraction
+    max_edge_deviation: Positive
     rival: NonNegative
+
+
+class NetworkSettings(NamedTuple):
+    """How the network's proposals are taken.
+
+    Attributes
+    ----------
+    peaks
+        Of each edge's probability that are looked at.
+    min_confidence
+        Of a pair of edges that is measured at all.
+    snap
+        Distance within which an edge of the view is the one that is meant, metres.
+    """
+
+    peaks: Count
+    min_confidence: Fraction
+    snap: Positive
 
 
 class PriorSettings(NamedTuple):
@@ -322,6 +369,7 @@ class DoorSettings:
     handle: HandleSettings
     lintel: LintelSettings
     verdict: VerdictSettings
+    network: NetworkSettings
     prior: PriorSettings
     candidates: Count
     calibration: Calibration

@@ -144,8 +144,10 @@ def fit_surfaces(
     values, covariance, counts = _solve(surfaces, start, None, calibration, settings)
     if min(counts[:2]) < settings.min_blocks:
         return None
-    opening = _opening(values, covariance, settings)
-    if opening == 0.0:
+    turn, deviation = _turn(values, covariance, settings)
+    least, deviations = settings.ajar
+    opening = turn if abs(turn) > max(least, deviations * deviation) else 0.0
+    if abs(turn) < settings.agree * deviation:
         closed = settings.closed
         values, covariance, counts = _solve(surfaces, values, closed, calibration, settings)
     unhidden = valid & inside & (offset < settings.reach)
@@ -169,13 +171,13 @@ def angle(line: NDArray[np.float64]) -> float:
     return float(np.arctan2(line[0], line[1]))
 
 
-def _opening(
+def _turn(
     values: NDArray[np.float64], covariance: NDArray[np.float64], settings: FitSettings
-) -> float:
-    turn = angle(values[PANEL]) - angle(values[WALL])
-    deviation = float(np.sqrt(_turn_row(values) @ covariance @ _turn_row(values)))
-    least, deviations = settings.ajar
-    return turn if abs(turn) > max(least, deviations * deviation) else 0.0
+) -> tuple[float, float]:
+    """Return the panel's angle to the wall and its standard deviation, radians."""
+    row = _turn_row(values)
+    deviation = float(np.hypot(np.sqrt(row @ covariance @ row), settings.closed))
+    return angle(values[PANEL]) - angle(values[WALL]), deviation
 
 
 def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:

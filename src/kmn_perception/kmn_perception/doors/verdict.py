@@ -19,6 +19,8 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     handle = found.handle if _is_on_panel(found, settings) else None
     if reason:
         status = DoorStatus.NO_DOOR
+    elif (doubt := _doubt(found, settings)):
+        status, reason = DoorStatus.AMBIGUOUS, doubt
     elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
         reason = "no handle is seen; it is sought " + _where(found)
@@ -56,7 +58,7 @@ def _score(found: Measurement, settings: DoorSettings) -> float:
     """Return how much speaks for the candidate, with its handle and top."""
     weight, score = settings.score, found.candidate.score
     if found.handle is not None:
-        score += weight.handle * min(found.handle.ratio / (3.0 * settings.handle.min_ratio), 1.0)
+        score += weight.handle * min(found.handle.ratio / (3.0 * settings.handle.alone.ratio), 1.0)
     if found.lintel.z is not None:
         score += weight.lintel
     elif found.lintel.seen_to > settings.verdict.height[1]:
@@ -95,6 +97,14 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
         return f"the top is at {top:.2f} m, doors are {low:g} to {high:g} m high"
     if found.lintel.z is None and found.lintel.seen_to > high:
         return f"no top is seen up to {found.lintel.seen_to:.2f} m"
+    return ""
+
+
+def _doubt(found: Measurement, settings: DoorSettings) -> str:
+    """Return which edge is not known well enough, or nothing."""
+    for side, deviation in zip(("left", "right"), found.edge_deviations, strict=True):
+        if deviation > settings.verdict.max_edge_deviation:
+            return f"several lines may be the {side} edge: it is known to {1e3 * deviation:.0f} mm"
     return ""
 
 

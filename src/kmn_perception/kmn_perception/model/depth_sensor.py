@@ -119,11 +119,15 @@ class ShadowSettings(NamedTuple):
         Distances of these viewpoints to that of the depth image, metres.
     filled
         Pixels by which shadows are narrower than geometry has it.
+    gaps
+        Whether the image was moved from the left viewpoint pixel by pixel, which leaves lines
+        without a measurement where a surface is stretched by that.
     """
 
     right: NonNegative
     left: NonNegative
     filled: NonNegative
+    gaps: bool
 
 
 class HoleSettings(NamedTuple):

@@ -62,9 +62,9 @@ class NoisySensor:
         fat = _fatten(depth, scale, edge.step, edge.fattening)
         seen = _jitter(fat, scale, edge.step, sensor.lateral, generator)
         kept = seen.copy()
-        _cast_shadow(depth[:, ::-1], kept[:, ::-1], fx * shadow.right, shadow.filled)
-        _cast_shadow(depth, kept, fx * shadow.left, shadow.filled)
-        _lose_edges(depth, kept, scale, edge.step, edge.loss, generator)
+        _cast_shadow(fat[:, ::-1], kept[:, ::-1], fx * shadow.right, shadow.filled)
+        _cast_shadow(fat, kept, fx * shadow.left, shadow.filled)
+        _lose_edges(fat, kept, scale, edge.step, edge.loss, generator)
         correlation = sensor.axial.correlation
         alike = _smooth_noise(depth.shape, correlation.length, generator)
         measured = _quantise(
@@ -77,6 +77,8 @@ class NoisySensor:
             sensor.disparity.step,
             generator,
         )
+        if shadow.gaps:
+            _open_gaps(measured, fx * shadow.left)
         _leave_out(measured, sensor, generator)
         return measured
 
@@ -168,6 +170,16 @@ def _cast_shadow(
             if shifted <= rightmost - filled:
                 kept[v, u] = np.nan
             rightmost = max(rightmost, shifted)
+
+
+@njit(cache=True)
+def _open_gaps(depth: NDArray[np.float32], scale: float) -> None:
+    """Remove pixels that no whole pixel of the left viewpoint, of a disparity scale, falls onto."""
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1] - 1):
+            here, there = u + scale / depth[v, u], u + 1.0 + scale / depth[v, u + 1]
+            if there > here and np.floor(here) == np.floor(there):
+                depth[v, u] = np.nan
 
 
 @njit(cache=True)

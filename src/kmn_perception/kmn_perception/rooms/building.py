@@ -65,13 +65,18 @@ class Plan(NamedTuple):
         ]
 
     def room(
-        self, kind: str, cuboids: Iterable[Cuboid], wall: Material, glass: tuple[str, ...] = ()
+        self,
+        kind: str,
+        cuboids: Iterable[Cuboid],
+        wall: Material | None,
+        glass: tuple[str, ...] = (),
     ) -> Room:
-        """Return a room of some bodies, a wall's furniture, and lamps; without a door's truth."""
+        """Return a room of some bodies, what is about a wall, and lamps; without a door's truth."""
         things, looks, lights = self.settings.things, self.settings.looks, self.settings.lights
+        more = furnish(self.draw, self.site, wall, things, looks) if wall else []
         return Room(
             kind=kind,
-            cuboids=(*cuboids, *furnish(self.draw, self.site, wall, things, looks)),
+            cuboids=(*cuboids, *more),
             wall=self.site.wall,
             lighting=draw_lighting(self.draw, lights),
             camera=self.camera,

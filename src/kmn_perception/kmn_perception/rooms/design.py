@@ -11,12 +11,23 @@ from numpy.typing import NDArray
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import SIDES, RoomModel
 from kmn_perception.rooms.draw import Draw
-from kmn_perception.rooms.room import Door
+from kmn_perception.rooms.room import Door, Room
 from kmn_perception.rooms.settings import DoorSettings
 
 SAMPLES = 101  # of an edge
 BESIDE = 0.01  # metres from an edge to where the panel is looked for
-SAME = 0.02  # metres between depths of one surface
+BUILT_IN = (
+    "panel",
+    "handle",
+    "fitting",
+    "sign",
+    "moulding",
+    "hinge",
+    "post",
+    "lintel",
+    "wall",
+    "seal",
+)
 CORNERS = {
     "top_left": (0.5, 0.5),
     "top_right": (-0.5, 0.5),
@@ -98,23 +109,27 @@ def truth(design: Design, model: RoomModel, camera: Camera) -> Door:
     )
 
 
-def seen_edges(door: Door, camera: Camera, depth: NDArray[np.float32]) -> dict[str, float]:
-    """Return which fractions of the panel's edges are seen in an exact depth image.
+def seen_edges(door: Door, room: Room, bodies: NDArray[np.int16]) -> dict[str, float]:
+    """Return which fractions of the panel's edges are in the image, and not hidden by things.
 
-    An edge is seen where the panel is, beside it.
+    An edge that frame or wall hide, as the deep reveal of a door that is seen from aside, counts as
+    seen: where it must be is seen from them.
+
+    Parameters
+    ----------
+    bodies
+        (height, width) index of the cuboid that is seen, see `Images`.
     """
+    own = np.array([body.name.partition("_")[0] in BUILT_IN for body in room.cuboids])
+    camera, fractions = replace(room.camera, pose=np.eye(4)), {}
     centre = np.mean(list(door.corners.values()), axis=0)
-    fractions = {}
     for name, ends in EDGES.items():
         start, end = (door.corners[corner] for corner in ends)
         inwards = centre - (start + end) / 2.0
         line = start + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (end - start)
-        points = line + BESIDE * inwards / np.linalg.norm(inwards)
-        pixels = replace(camera, pose=np.eye(4)).project(points)
-        within, (u, v, z) = inside(pixels, camera), pixels.T
-        column, row = (np.where(within, np.rint(pixel), 0).astype(int) for pixel in (u, v))
-        seen = within & (np.abs(depth[row, column] - z) < SAME)
-        fractions[name] = float(seen.mean())
+        pixels = camera.project(line + BESIDE * inwards / np.linalg.norm(inwards))
+        found = bodies[tuple(np.rint(pixels[inside(pixels, camera), 1::-1]).astype(int).T)]
+        fractions[name] = float(own[found[found >= 0]].sum() / SAMPLES)
     return fractions
 
 

@@ -77,7 +77,8 @@ def furnish(
         thickness = draw.between(size.thickness)
         z = draw.between((0.9 + height / 2.0, 2.3 - height / 2.0))
         centre = (site.face - thickness / 2.0, y, z)
-        found.append(site.at("poster", centre, (thickness, width, height), other()))
+        look = printed(draw, other(), things, looks)
+        found.append(site.at("poster", centre, (thickness, width, height), look))
     if draw.chance(things.switch):
         y = draw.sign() * (site.half + draw.between((0.06, 0.25)))
         centre = (site.face - 0.006, y, draw.between((0.95, 1.25)))
@@ -156,13 +157,22 @@ def chair(draw: Draw, site: Site, at: tuple[float, float], material: Material) -
 
 
 def _clear(things: list[Cuboid], site: Site, clearance: float) -> list[Cuboid]:
-    """Return things that leave room for the camera and do not stand in the wall, else none."""
+    """Return things if all of them are off the camera by a clearance, else none."""
     for thing in things:
         middle = (np.linalg.inv(site.wall) @ thing.cube)[:3, 3]
         reach = np.linalg.norm(thing.cube[:2, :2], axis=0).sum() / 2.0
         if np.linalg.norm((middle - site.camera)[:2]) < reach + clearance:
             return []
     return things
+
+
+def printed(
+    draw: Draw, material: Material, things: ThingsSettings, looks: LooksSettings
+) -> Material:
+    """Draw whether something is written on a material."""
+    if draw.chance(things.printed):
+        return draw.tiled(material, looks.print, stagger=draw.between((0.0, 0.5)))
+    return material
 
 
 def on_panel(
@@ -173,7 +183,7 @@ def on_panel(
     things: ThingsSettings,
     looks: LooksSettings,
 ) -> list[Cuboid]:
-    """Draw a sheet and mouldings on a panel of a size (3,), of which (4, 4) is the frame."""
+    """Draw what is on a panel of a size (3,), of which (4, 4) is the frame."""
     found, front = [], -size[0] / 2.0
     if draw.chance(things.sign):
         width, height = draw.between((0.15, 0.4)), draw.between((0.1, 0.6))
@@ -181,7 +191,13 @@ def on_panel(
         y = draw.between((-0.5, 0.5)) * (size[1] - width - 0.1)
         low = (front - 0.001, y - width / 2.0, z - height / 2.0)
         high = (front, y + width / 2.0, z + height / 2.0)
-        found.append(cuboid("sign", low, high, draw.material(looks, looks.other), panel))
+        look = printed(draw, draw.material(looks, looks.other), things, looks)
+        found.append(cuboid("sign", low, high, look, panel))
+    if draw.chance(things.hinges):
+        look, half = draw.material(looks, looks.other), np.array(things.hinge_size) / 2.0
+        for share in things.hinge_heights:
+            middle = np.array([front, size[1] / 2.0 - half[1], share * size[2]])
+            found.append(cuboid("hinge", middle - half, middle + half, look, panel))
     if draw.chance(things.mouldings):
         side, depth = draw.between((0.12, 0.2)), draw.between((0.004, 0.012))
         inner = size[1] / 2.0 - side

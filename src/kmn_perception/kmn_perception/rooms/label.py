@@ -42,6 +42,7 @@ def label(frame: Frame, name: str, source: dict[str, Any]) -> dict[str, Any]:
             "height": camera.height,
             "K": camera.matrix.tolist(),
             "D": [0.0] * 5,
+            "D_plumb_bob_colour_only": [0.0] * 5,
         },
     }
     if room.door is None:
@@ -61,7 +62,7 @@ def label(frame: Frame, name: str, source: dict[str, Any]) -> dict[str, Any]:
         "annotations": {
             "edges": {
                 name: {"visible": seen >= VISIBLE, "seen": round(seen, 2)}
-                for name, seen in seen_edges(door, camera, frame.images.depth).items()
+                for name, seen in seen_edges(door, room, frame.images.bodies).items()
             }
         },
         "reference": {"metric": metric(door, camera)},

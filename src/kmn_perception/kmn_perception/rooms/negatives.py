@@ -46,8 +46,15 @@ def build_corridor(plan: Plan, kind: str) -> Room:
         site.cuboid("wall", along, (-right - THICK, -right), (0.0, high), wall),
         site.cuboid("end", (far, far + THICK), across, (0.0, high), materials["panel"]),
         site.cuboid("floor", along, across, (-0.1, 0.0), floor),
+        site.cuboid("ceiling", along, across, (high, high + 0.1), materials["seal"]),
     ]
-    return plan.room(kind, bodies, wall)
+    for _ in range(draw.count(plan.settings.things.posters)):
+        x, z = draw.between((-2.0, far - 1.0)), draw.between((1.2, 1.8))
+        side = draw.sign()
+        y = left - 0.01 if side > 0.0 else 0.01 - right
+        size = (draw.between((0.2, 1.0)), 0.02, draw.between((0.3, 0.9)))
+        bodies.append(site.at("poster", (x, y, z), size, materials["post"]))
+    return plan.room(kind, bodies, None)
 
 
 def build_glass(plan: Plan, kind: str) -> Room:
@@ -88,6 +95,13 @@ def build_double(plan: Plan, kind: str) -> Room:
         leaf = plan._replace(design=plan.design._replace(values=values, side=side))
         bodies += [body for body in leaf.cuboids(materials) if not _is_around(body)]
     return wide.room(kind, bodies, materials["wall"])
+
+
+def build_doorway(plan: Plan, kind: str) -> Room:
+    """Return the opening of a door that is not there."""
+    materials = draw_materials(plan.draw, plan.settings.looks)
+    bodies = [body for body in plan.cuboids(materials) if _is_around(body)]
+    return plan.room(kind, bodies, materials["wall"])
 
 
 def build_person(plan: Plan, kind: str) -> Room:

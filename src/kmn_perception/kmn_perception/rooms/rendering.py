@@ -121,8 +121,21 @@ def _expose(
     bright = generator.uniform(*settings.brightness)
     white = max(float(np.percentile(light[::4, ::4], settings.percentile)), 1e-6)
     blurred = cv2.GaussianBlur(light * np.float32(bright / white), (0, 0), settings.blur)
+    if generator.random() < settings.moved:
+        length, angle = generator.uniform(*settings.motion), generator.uniform(0.0, np.pi)
+        blurred = cv2.filter2D(blurred, -1, _line(float(length), float(angle)))
     shot, read = settings.noise.shot, settings.noise.read
     sigma = np.sqrt(np.float32(shot**2) * blurred + np.float32(read**2))
     blurred = blurred + sigma * generator.standard_normal(blurred.shape, dtype=np.float32)
     values = np.clip(blurred, 0.0, 1.0) ** np.float32(1.0 / settings.gamma)
     return np.rint(255.0 * values).astype(np.uint8)
+
+
+def _line(length: float, angle: float) -> NDArray[np.float32]:
+    """Return the kernel of a motion along a line, pixels and rad."""
+    reach = int(np.ceil(length / 2.0))
+    kernel = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=np.float32)
+    steps = np.linspace(-length / 2.0, length / 2.0, 16 * reach + 1)
+    columns, rows = (np.rint(reach + steps * f(angle)).astype(int) for f in (np.cos, np.sin))
+    np.add.at(kernel, (rows, columns), 1.0)
+    return kernel / kernel.sum()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
+from zlib import crc32
 
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import RoomModel
@@ -45,6 +47,7 @@ KINDS = {
     "person": Kind(negatives.build_person),
     "one_edge": Kind(build_door, _one_edge),
     "no_floor": Kind(build_door, _no_floor),
+    "wide_open": Kind(build_door),
     "wall": Kind(negatives.build_wall),
     "brick": Kind(negatives.build_wall),
     "cupboard": Kind(negatives.build_wall),
@@ -53,7 +56,11 @@ KINDS = {
     "corridor": Kind(negatives.build_corridor, _within_corridor),
     "glass": Kind(negatives.build_glass),
     "double": Kind(negatives.build_double),
+    "doorway": Kind(negatives.build_doorway),
 }
+
+
+_model = cache(RoomModel.load)  # which takes longer than all draws
 
 
 def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "door") -> Room:
@@ -62,14 +69,17 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
     Parameters
     ----------
     kind
-        One of ``KINDS``; the first four have a door.
+        One of ``KINDS``; the first five have a door.
     """
-    draw, model = Draw(seed, list(KINDS).index(kind)), RoomModel.load(settings.model)
+    draw, model = Draw(seed, crc32(kind.encode())), _model(settings.model)
     design, where = draw_design(draw, model, settings.door), settings.camera
     if kind == "one_edge":
         where = where._replace(heading=settings.negatives.one_edge_heading)
     elif kind == "no_floor":
         where = where._replace(aim=settings.negatives.no_floor_aim)
+    elif kind == "wide_open":
+        wide = {"opening": draw.between(settings.negatives.wide_open)}
+        design = design._replace(nuisance=design.nuisance | wide)
     needed, suits = 2 if draw.chance(where.both_edges) else 1, KINDS[kind].suits
 
     def acceptable(seen_by: Camera, placed: Design) -> bool:

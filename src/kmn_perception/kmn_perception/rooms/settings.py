@@ -91,6 +91,7 @@ class LooksSettings(NamedTuple):
     stretch: Positive
     tiles: Fraction
     tile: TileSettings
+    print: TileSettings
     brick: TileSettings
 
 
@@ -135,10 +136,14 @@ class ThingsSettings(NamedTuple):
     skirting: Fraction
     skirting_size: SkirtingSettings
     posters: tuple[int, int]
+    printed: Fraction
     poster_size: PosterSettings
     sign: Fraction
     switch: Fraction
     mouldings: Fraction
+    hinges: Fraction
+    hinge_heights: tuple[Fraction, ...]
+    hinge_size: tuple[Positive, Positive, Positive]
     ceiling: Interval
     side_wall: Fraction
     side_distance: SideSettings
@@ -154,6 +159,7 @@ class NegativesSettings(NamedTuple):
 
     one_edge_heading: NonNegative
     no_floor_aim: Interval
+    wide_open: Interval
     corridor_length: Interval
     corridor_half: Interval
     cupboard_depth: Interval
@@ -189,6 +195,8 @@ class ImageSettings(NamedTuple):
         Deviation of lens and demosaicing, pixels.
     gamma
         Values are stored to the power of 1 / gamma.
+    moved, motion
+        How often the camera moves while it sees, and by how many pixels.
     """
 
     subsamples: Count
@@ -196,6 +204,8 @@ class ImageSettings(NamedTuple):
     percentile: Positive
     blur: Positive
     gamma: Positive
+    moved: Fraction
+    motion: Interval
     noise: NoiseSettings
     shadow: ShadowSettings
 

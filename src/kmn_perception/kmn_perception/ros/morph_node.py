@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -34,7 +34,12 @@ from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.pipeline_loading import load_pipeline
-from kmn_perception.ros.reports import REPORT_PERIOD, ThrottledWarnings, report_periodically
+from kmn_perception.ros.reports import (
+    REPORT_PERIOD,
+    ChangeWarnings,
+    ThrottledWarnings,
+    report_periodically,
+)
 from kmn_perception.ros.sensor_watch import SensorWatch
 from kmn_perception.scene.sensor_diagnosis import DiagnosisSettings
 from kmn_perception.scene.tracking import ObjectTracker
@@ -101,7 +106,7 @@ class MorphNode(Node):
         scene = settings.pipeline.scene
         self._sensor = SensorWatch(REPORT_PERIOD, DiagnosisSettings.load(), scene.intrinsics)
         self._tracker = ObjectTracker(settings.object_distance, scene.memory)
-        self._warnings = ThrottledWarnings(self)
+        self._warnings, self._failures = ThrottledWarnings(self), ChangeWarnings(self)
         self._connect()
         reliability = ReliabilityPolicy[settings.reliability.upper()]
         self._frames = FrameReceiver(
@@ -180,10 +185,7 @@ class MorphNode(Node):
         except Exception as error:  # a node never dies of a message
             self._refuse("internal_error", traceback.format_exc())
             return FrameEstimates(pipeline, header, [_none(pipeline, repr(error))])
-        for found in objects:
-            status, reason = found.estimate.status, found.estimate.reason
-            if status is not Status.OK:
-                self._warnings.warn(status.name, f"{status.name}: {reason}")
+        self._warn_of({found.estimate.status: found.estimate.reason for found in objects})
         latency = time.monotonic() - frame.received
         results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
         self._statistics.use(results, latency)
@@ -203,6 +205,14 @@ class MorphNode(Node):
         seen = [found.observation.points for found in objects]
         numbers = iter(self._tracker.update([p.mean(axis=0) for p in seen if len(p)]))
         return [next(numbers) if len(p) else 0 for p in seen]
+
+    def _warn_of(self, reasons: Mapping[Status, str]) -> None:
+        """Log each status of a frame's objects that is not OK, unless the last frame had it."""
+        for status in Status:
+            if status not in reasons:
+                self._failures.clear(status.name)
+            elif status is not Status.OK:
+                self._failures.warn(status.name, "", f"{status.name}: {reasons[status]}")
 
     def _refuse(self, reason: str, text: str) -> None:
         self._statistics.refuse(reason, text)

@@ -37,6 +37,35 @@ class ThrottledWarnings:
             self._logger.warning(text)
 
 
+class ChangeWarnings:
+    """Logs what may last when it begins or changes, not as long as it lasts.
+
+    What comes and goes is said again, but not more often than `ThrottledWarnings` does.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._throttled = ThrottledWarnings(node)
+        self._present: dict[str, str] = {}
+
+    def warn(self, subject: str, reason: str, text: str) -> None:
+        """Log a warning, unless this was the last reason already.
+
+        Parameters
+        ----------
+        subject
+            What it is about, e.g. a topic.
+        reason
+            Key that stays the same while the text may change.
+        """
+        if self._present.get(subject) != reason:
+            self._present[subject] = reason
+            self._throttled.warn(f"{subject} {reason}", text)
+
+    def clear(self, subject: str) -> None:
+        """Note that all is well with a subject."""
+        self._present.pop(subject, None)
+
+
 class NameWatch:
     """Notices other nodes of a node's name, whose parameters and services cannot be told apart."""
 

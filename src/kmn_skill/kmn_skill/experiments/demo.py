@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.command_line.arguments import whole_number
+from kmn_perception.command_line.arguments import output_folder, whole_number
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
@@ -73,7 +73,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(
         "--out",
-        type=Path,
+        type=output_folder,
         default=Path("outputs/door_demo"),
         help="folder of recording and pictures",
     )

@@ -29,7 +29,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
-from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
+from kmn_perception.ros.reports import ChangeWarnings, ThrottledWarnings, report_periodically
 from kmn_perception.ros.stamps import seconds
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.errors import DoorError
@@ -43,7 +43,6 @@ from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.ros import messages
-from kmn_skill.ros.change_warnings import ChangeWarnings
 from kmn_skill.ros.goal_client import GoalClient
 from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics

@@ -1,0 +1,88 @@
+"""What the network sees of a wall's view: coarse cells of gradients, offsets and masks."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.lines import gaussian_steps
+from kmn_perception.doors.wall_view import WallView
+
+ROWS = 64  # cells above each other, from the view's top
+_HIGH, _WIDE = 8, 4  # pixels of the view in a cell
+_SMOOTHING = 1.5  # pixels
+_STEP, _OFFSET = 0.4, 12.0  # largest step of the logarithm of grey, and offset in pixel noises
+
+
+def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]:
+    """Return the cells (6, ROWS, N) of a view, -1 to 1.
+
+    They are: step to the right and step downwards of the logarithm of grey, offset of the inverse
+    depth, and the shares that are measured, in the image, and hidden by something before the wall.
+
+    Parameters
+    ----------
+    noise
+        Standard deviation of an inverse depth, 1/m.
+    before
+        Offset of the inverse depth from which something stands before the wall, 1/m.
+    """
+    shade = np.zeros_like(view.offset) if view.grey is None else view.grey
+    within = cv2.erode(view.inside.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    right = _in_cells(gaussian_steps(shade, _SMOOTHING) * within)
+    down = _in_cells(gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T * within)
+    measured = np.isfinite(view.offset)
+    offset = np.nan_to_num(view.offset, nan=0.0)
+    share = _mean(measured.astype(np.float32))
+    scaled = _mean(np.clip(offset / noise, -_OFFSET, _OFFSET)) / np.maximum(share, 1e-3)
+    channels = [
+        np.clip(_strongest(right.mean(axis=1), axis=2) / _STEP, -1.0, 1.0),
+        np.clip(_strongest(down.mean(axis=3), axis=1) / _STEP, -1.0, 1.0),
+        np.clip(scaled * (share > 0.1) / _OFFSET, -1.0, 1.0),
+        2.0 * share - 1.0,
+        2.0 * _mean(view.inside.astype(np.float32)) - 1.0,
+        2.0 * _mean((offset > before).astype(np.float32)) - 1.0,
+    ]
+    return np.stack(channels).astype(np.float32)
+
+
+def column_of(view: WallView, cell: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the column of the view in the middle of a cell's column."""
+    return cell * _WIDE + 0.5 * (_WIDE - 1)
+
+
+def cell_of(view: WallView, column: float) -> float:
+    """Return the cell's column of a column of the view."""
+    return (column - 0.5 * (_WIDE - 1)) / _WIDE
+
+
+def row_of(view: WallView, row: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the cell's row of rows of the view."""
+    return (row - 0.5 * (_HIGH - 1)) / _HIGH
+
+
+def height_of(view: WallView, row: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the height above the floor of the middle of a cell's row, metres."""
+    pixel = float(view.z[0] - view.z[1])
+    return float(view.z[0]) - pixel * (row * _HIGH + 0.5 * (_HIGH - 1))
+
+
+def _in_cells(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return values (ROWS, high, N, wide) of each cell; missing rows at the bottom are 0."""
+    values = values[: ROWS * _HIGH, : values.shape[1] // _WIDE * _WIDE]
+    missing = ROWS * _HIGH - len(values)
+    if missing:
+        values = np.pad(values, ((0, missing), (0, 0)))
+    return values.reshape(ROWS, _HIGH, -1, _WIDE)
+
+
+def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    mean: NDArray[np.float32] = _in_cells(values).mean(axis=(1, 3))
+    return mean
+
+
+def _strongest(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+    """Return the value of largest size along an axis."""
+    at = np.expand_dims(np.abs(values).argmax(axis=axis), axis)
+    return np.take_along_axis(values, at, axis).squeeze(axis)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.door_finder import DoorFinder, Frame
+from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.geometry import DOOR
 from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.walls import Frame
 from kmn_perception.estimator import Estimate, EstimatorSettings, Quantity, Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel

@@ -9,6 +9,7 @@ EXECUTABLES = {
     "train": ("kmn_perception.training.train", "training"),
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
+    "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "benchmark": ("kmn_perception.benchmark", ""),

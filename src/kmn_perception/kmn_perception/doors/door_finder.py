@@ -1,53 +1,22 @@
-"""From a frame to the door in it: planes, the vertical, walls, edges, handle, one fit, a verdict."""
+"""From a frame to the door in it: walls, edges, handle, one fit, a verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kmn_perception.doors.camera_check import doubt_upright, find_contradiction
+from kmn_perception.doors.camera_check import doubt_upright
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
-from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.proposals import with_proposals
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
 from kmn_perception.doors.verdict import judge
-from kmn_perception.doors.wall_view import WallFrame, view_wall
-from kmn_perception.model.camera import Camera
+from kmn_perception.doors.wall_view import WallView
+from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
 from kmn_perception.network.wall_network import WallNetwork
-
-_MAX_WALLS = 3
-
-
-class Frame(NamedTuple):
-    """What was measured in one exposure.
-
-    Attributes
-    ----------
-    depth
-        (height, width) metres, 0 for none.
-    grey
-        (height, width) 0 to 1, of the same pixels; None without an image.
-    camera
-        Their pinhole camera; its pose is not used.
-    up, height
-        What is known of the camera: the upward unit vector (3,) in the optical frame, and its
-        height above the floor, metres. What is not given is found in the frame.
-    """
-
-    depth: NDArray[np.float32]
-    grey: NDArray[np.float32] | None
-    camera: Camera
-    up: NDArray[np.float64] | None = None
-    height: float | None = None
 
 
 class DoorFinder:
@@ -67,29 +36,24 @@ class DoorFinder:
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""
         settings = self.settings
-        noise = settings.fit.pixel_noise
-        generator = np.random.default_rng(self.seed)
-        blocks = Blocks.of(frame.depth, frame.camera, noise, settings.planes)
-        planes = find_planes(blocks, noise, settings.planes, generator)
-        if not planes:
-            return DoorEstimate.none("no plane is seen")
-        up = self._up(frame, planes)
-        if frame.up is not None:
-            wrong = find_contradiction(planes, up, frame.height, settings)
-            if wrong:
-                return DoorEstimate.none(wrong)
-        walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
-        floor = frame.height
-        if floor is None:
-            floor = self._camera_height(blocks, up, walls)
-        height = settings.prior.handle_height[0] if floor is None else floor
-        if not walls:
-            return DoorEstimate.none("no wall is seen")
-        candidates = [
-            candidate
-            for wall in walls[:_MAX_WALLS]
-            for candidate in self._candidates(frame, wall, up, height)
-        ]
+        try:
+            walls = find_walls(frame, settings, np.random.default_rng(self.seed))
+        except NoWallError as error:
+            return DoorEstimate.none(str(error))
+        best = self._search(frame, walls)
+        if best.handle_side and not walls.floor_seen:
+            # By the handle's usual height the camera is somewhere else above the floor.
+            walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
+            best = self._search(frame, walls)
+        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
+            doubt = doubt_upright(best, walls.planes, walls.up, settings)
+            best = DoorEstimate.none(doubt) if doubt else best
+        return best
+
+    def _search(self, frame: Frame, walls: Walls) -> DoorEstimate:
+        """Return the best door of the walls."""
+        settings = self.settings
+        candidates = [candidate for view in walls.views for candidate in self._candidates(view)]
         if not candidates:
             return DoorEstimate.none(_no_edges(frame))
         candidates.sort(key=lambda candidate: -candidate.score)
@@ -99,61 +63,20 @@ class DoorFinder:
             bar = max((door.score for door in found if door.found), default=-np.inf)
             if candidate.score + bonus < bar:
                 break  # neither this nor a later one can be as good
-            measurement = measure(frame, blocks, candidate, floor is not None, settings)
+            measurement = measure(frame, walls.blocks, candidate, walls.floor_seen, settings)
             if measurement is not None:
                 found.append(judge(measurement, settings))
-        if not found:
-            return DoorEstimate.none("no wall beside a panel is seen")
-        best = self._best(found)
-        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
-            doubt = doubt_upright(best, planes, up, settings)
-            if doubt:
-                return DoorEstimate.none(doubt)
-        return best
+        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
 
-    def _up(self, frame: Frame, planes: list[Plane]) -> NDArray[np.float64]:
-        """Return the upward vector (3,) as it is given, or as the frame shows it."""
-        if frame.up is not None:
-            return frame.up
-        segments = None
-        if frame.grey is not None:
-            segments = line_segments(frame.grey, frame.camera, self.settings.vertical)
-        return find_up(planes, segments, self.settings.vertical)
-
-    def _camera_height(
-        self, blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane]
-    ) -> float | None:
-        settings = self.settings.floor
-        rays, inverse, valid = blocks.flat()
-        level = np.ones_like(valid)
-        for wall in walls:
-            reach = self.settings.planes.inlier * self.settings.fit.pixel_noise
-            level &= np.abs(rays @ wall.vector - inverse) > reach
-        return find_camera_height(
-            rays[valid] @ up,
-            inverse[valid],
-            level[valid],
-            self.settings.fit.pixel_noise,
-            settings.heights,
-            settings.min_blocks,
-            settings.max_deviation,
-        )
-
-    def _candidates(
-        self, frame: Frame, wall: Plane, up: NDArray[np.float64], height: float
-    ) -> list[Candidate]:
+    def _candidates(self, view: WallView) -> list[Candidate]:
         """Return the pairs of upright edges of a wall."""
         settings, noise = self.settings, self.settings.fit.pixel_noise
-        at = WallFrame.of(wall.vector, up, height)
-        view = view_wall(at, frame.depth, frame.grey, frame.camera, settings.view)
-        if view is None:
-            return []
         before, behind = settings.view.before * noise, settings.view.behind * noise
         pieces = cut_to_pieces(view, before, behind, settings.lines)
         lines = find_lines(pieces, settings.lines)
         candidates = find_candidates(view, pieces, lines, settings)
-        if self.network is None:
-            return candidates
+        if self.network is None or view.grey is None:
+            return candidates  # it was trained on images, and knows little of depth alone
         return with_proposals(candidates, view, pieces, lines, self.network, settings)
 
     def _best(self, found: list[DoorEstimate]) -> DoorEstimate:

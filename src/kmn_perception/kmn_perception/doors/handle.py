@@ -91,8 +91,8 @@ def find_handle(
     # What stands out is seen further from the point of the panel that is nearest to the camera.
     shifts = {s: settings.protrusion[0] * s / frame.distance for s in edges}
     first, last = left + min(shifts[left], 0.0), right + max(shifts[right], 0.0)
-    s = np.arange(first - margin, last + margin, _PIXEL)
-    z = np.arange(high + margin, low - margin, -_PIXEL)
+    s = np.arange(first - margin, last + margin, _PIXEL, dtype=np.float64)
+    z = np.arange(high + margin, low - margin, -_PIXEL, dtype=np.float64)
     view = resample(frame, s, z, depth, grey, camera)
     windows = {
         "left": (s > left + shifts[left] - 0.01) & (s < left + shifts[left] + settings.reach),

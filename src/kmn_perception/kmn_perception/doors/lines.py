@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.settings import LineSettings
+from kmn_perception.doors.search_settings import LineSettings
 from kmn_perception.doors.wall_view import WallView
 
 CLIP = 1.5  # of gradients; a stronger one is no better an edge
@@ -72,9 +72,7 @@ class Pieces:
     rows: NDArray[np.int64]
 
 
-def cut_to_pieces(
-    view: WallView, before: float, behind: float, settings: LineSettings
-) -> Pieces:
+def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSettings) -> Pieces:
     """Take gradient and depth of a view's columns.
 
     Parameters
@@ -119,7 +117,10 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     gradient, known = pieces.gradient[body], pieces.known[body]
     visible = known.sum(axis=0)
     noise = np.array(
-        [1.48 * np.median(np.abs(g[k])) if k.any() else 1.0 for g, k in zip(gradient, known)]
+        [
+            1.48 * np.median(np.abs(g[k])) if k.any() else 1.0
+            for g, k in zip(gradient, known, strict=True)
+        ]
     )
     least = np.maximum(settings.noise_factor * noise, settings.min_contrast)[:, None]
     found = []
@@ -138,9 +139,7 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     return sorted(found)
 
 
-def _steps_without_grey(
-    pieces: Pieces, lines: list[Line], settings: LineSettings
-) -> list[Line]:
+def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSettings) -> list[Line]:
     """Return the steps in depth beside which grey shows no edge."""
     size = np.abs(pieces.step).astype(np.float32)
     peak = (size >= largest_near(size, 25)) & (size > settings.min_step)
@@ -159,7 +158,8 @@ def gaussian_steps(grey: NDArray[np.float32], smoothing: float) -> NDArray[np.fl
     weights = x * np.exp(-0.5 * (x / smoothing) ** 2)
     weights *= smoothing * np.sqrt(2.0 * np.pi) / (weights * x).sum()
     kernel = weights[None].astype(np.float32)
-    return cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    steps = cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(steps, dtype=np.float32)
 
 
 def _gradient(

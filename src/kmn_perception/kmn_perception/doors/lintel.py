@@ -102,7 +102,7 @@ def _rows(
     pieces = (steps * known)[:, : count * size].reshape(shape).sum(axis=2) / np.maximum(number, 1)
     told = number > 0.5 * size
     visible = np.maximum(told.sum(axis=1), 1)
-    best = np.zeros(len(view.z))
+    best: NDArray[np.float64] = np.zeros(len(view.z))
     enough = np.zeros(len(view.z), dtype=np.bool_)
     for sign in (1.0, -1.0):
         near = cv2.dilate((sign * pieces).astype(np.float32), np.ones((5, 1), np.uint8))

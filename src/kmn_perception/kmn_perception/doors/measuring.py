@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,7 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallFrame, WallView
-
-if TYPE_CHECKING:
-    from kmn_perception.doors.door_finder import Frame
+from kmn_perception.doors.walls import Frame
 
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
@@ -75,9 +73,7 @@ def measure(
         for (direction, deviation), spread in zip(edges, spreads, strict=True)
     ]
     directions = edges[0][0], edges[1][0]
-    surfaces = fit_surfaces(
-        blocks, at, directions, floor, settings.calibration, settings.fit
-    )
+    surfaces = fit_surfaces(blocks, at, directions, floor, settings.calibration, settings.fit)
     if surfaces is None:
         return None
     heights = _lintel_heights(at, directions, surfaces, settings)
@@ -97,8 +93,16 @@ def measure(
     )
     shape = door_shape(measured, handle_left, ajar)
     return Measurement(
-        candidate, surfaces, lintel, handle, shape, values, spread, float(measured[4]),
-        (edges[0][1] * at.distance, edges[1][1] * at.distance), floor
+        candidate,
+        surfaces,
+        lintel,
+        handle,
+        shape,
+        values,
+        spread,
+        float(measured[4]),
+        (edges[0][1] * at.distance, edges[1][1] * at.distance),
+        floor,
     )
 
 
@@ -232,48 +236,41 @@ def _gather(
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         recess.append(depth)
         outward = direction < 0.0 if i == 0 else direction > 0.0
-        if depth < 0.0:
-            told = _PROUD
-        else:
-            told = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        told = _PROUD if depth < 0.0 else reveal
         values[7 + i], deviations[7 + i] = told
-    middle = 0.5 * (edges[0][0] + edges[1][0])
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
-    far = 1.0 / float(wall_line @ np.array([middle, 1.0]))
-    if lintel.z is None:
-        top, deviation = _usual_top(lintel, settings)
-        values[9], deviations[9] = (top - height) / far, deviation / far
-    else:
-        values[9] = (lintel.z - at.height) / at.distance
-        deviations[9] = lintel.deviation / at.distance
-    covariance = np.zeros((13, 13))
-    covariance[:5, :5] = surfaces.covariance[:5, :5]
     if handle is None:
         # Where to look: at the usual place of the right edge.
-        ray = np.array([edges[1][0], 1.0])
-        far = 1.0 / (panel_line @ ray)
-        inset = settings.prior.handle_inset
-        values[10] = edges[1][0] - inset[0] / far
-        deviations[10] = (middle - edges[0][0]) * 2.0
+        far = 1.0 / float(panel_line @ np.array([edges[1][0], 1.0]))
+        values[10] = edges[1][0] - settings.prior.handle_inset[0] / far
+        deviations[10] = edges[1][0] - edges[0][0]
         values[11], deviations[11] = (expected[0] - height) / far, 3.0 * expected[1] / far
     else:
         point = panel.points(np.array(handle.s), np.array(handle.z))
         away = float(-point @ at.normal)
-        values[10] = float(point @ at.right) / away
-        values[11] = float(point @ at.up) / away
-        deviations[10] = handle.along_noise / away
-        deviations[11] = handle.up_noise / away
+        values[10], values[11] = float(point @ at.right) / away, float(point @ at.up) / away
+        deviations[10], deviations[11] = handle.along_noise / away, handle.up_noise / away
     values[12], deviations[12] = settings.handle.protrusion
-    covariance += np.diag(deviations**2)
+    covariance = np.zeros((13, 13))
+    covariance[:5, :5] = surfaces.covariance[:5, :5]
     if not floor:
         # The handle's usual height tells the floor's, and no more than that.
-        ray = np.array([values[10], 1.0])
-        away = 1.0 / (panel_line @ ray)
-        height = expected[0] - values[11] * away if handle is not None else height
+        if handle is not None:
+            away = 1.0 / float(panel_line @ np.array([values[10], 1.0]))
+            height = expected[0] - values[11] * away
         values[4] = 1.0 / height
         covariance[4, :] = covariance[:, 4] = 0.0
         covariance[4, 4] = (expected[1] / height**2) ** 2
+    if lintel.z is None:
+        top, deviation = _usual_top(lintel, settings)
+        far = 1.0 / float(wall_line @ np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0]))
+        values[9], deviations[9] = (top - height) / far, deviation / far
+    else:
+        values[9] = (lintel.z - at.height) / at.distance
+        deviations[9] = lintel.deviation / at.distance
+    covariance += np.diag(deviations**2)
     return values, covariance
 
 

@@ -74,14 +74,16 @@ def handle_of(candidate: Candidate) -> SeenHandle | None:
     last = round(cell_of(view, candidate.right.column)) + _BESIDE
     inside = cells[:, :, first : last + 1]
     total = inside.sum(axis=0)
-    row, column = np.unravel_index(int(total.argmax()), total.shape)
+    row, column = divmod(int(total.argmax()), total.shape[1])
     rows = slice(max(row - 2, 0), row + 3)
     columns = slice(max(column - 3, 0), column + 4)
     part = inside[:, rows, columns]
     weights = part.sum(axis=0)
     at = column_of(view, first + columns.start + np.arange(weights.shape[1]))
     s = view.s[0] + np.average(at, weights=weights.sum(axis=0)) * (view.s[1] - view.s[0])
-    z = np.average(height_of(view, rows.start + np.arange(len(weights))), weights=weights.sum(axis=1))
+    z = np.average(
+        height_of(view, rows.start + np.arange(len(weights))), weights=weights.sum(axis=1)
+    )
     kind = KINDS[int(part.sum(axis=(1, 2)).argmax())]
     return SeenHandle(kind, float(s), float(z), float(part.sum()))
 

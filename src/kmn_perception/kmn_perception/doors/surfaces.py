@@ -134,13 +134,13 @@ def fit_surfaces(
 
     wall_seen = seen(WALL, near & level & beside, settings.block_noise)
     panel_seen = seen(PANEL, near & inside, settings.block_noise)
-    lines = [_start(surface, settings) for surface in (wall_seen, panel_seen)]
-    if any(line is None for line in lines):
+    wall, panel = (_start(surface, settings) for surface in (wall_seen, panel_seen))
+    if wall is None or panel is None:
         return None
     surfaces = [wall_seen, panel_seen]
     if floor:
         surfaces.append(seen(FLOOR, valid & (axes[:, 2] < 0.0), settings.floor_noise))
-    start = np.concatenate((lines[0], lines[1], [1.0 / frame.height], np.zeros(SIZE - 5)))
+    start = np.concatenate((wall, panel, [1.0 / frame.height], np.zeros(SIZE - 5)))
     values, covariance, counts = _solve(surfaces, start, None, calibration, settings)
     if min(counts[:2]) < settings.min_blocks:
         return None
@@ -265,5 +265,5 @@ def _solve(
             turn = angle(values[PANEL]) - angle(values[WALL])
             information += np.outer(row, row) / closed**2
             right_side += row * (row @ values - turn) / closed**2
-        values = np.linalg.solve(information, right_side)
-    return values, np.linalg.inv(information), counts
+        values = np.linalg.solve(information, right_side).astype(np.float64)
+    return values, np.linalg.inv(information).astype(np.float64), counts

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.planes import Plane
-from kmn_perception.doors.settings import VerticalSettings
+from kmn_perception.doors.search_settings import VerticalSettings
 from kmn_perception.model.camera import Camera
 
 _REWEIGHTINGS = 12
@@ -35,12 +35,14 @@ def line_segments(
     """
     image = (np.clip(np.nan_to_num(grey), 0.0, 1.0) * 255.0).astype(np.uint8)
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(image)[0]
-    ends = np.empty((0, 4)) if found is None else found.reshape(-1, 4).astype(np.float64)
+    ends: NDArray[np.float64] = np.asarray(
+        [] if found is None else found, dtype=np.float64
+    ).reshape(-1, 4)
     length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
     ends, length = ends[length >= settings.min_segment], length[length >= settings.min_segment]
     normals = np.cross(camera.rays(ends[:, 0], ends[:, 1]), camera.rays(ends[:, 2], ends[:, 3]))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, settings.segment_noise / length
+    return np.asarray(normals, dtype=np.float64), settings.segment_noise / length
 
 
 def find_up(

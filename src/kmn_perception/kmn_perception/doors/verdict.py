@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.geometry import DOOR, HANDLE_INSET
@@ -12,6 +13,8 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
 
+_UNLIKELY = 0.02  # of the network's probability of the edges
+
 
 def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     """Return the estimate of a measured candidate, with what it is worth."""
@@ -19,8 +22,10 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     handle = found.handle if _is_on_panel(found, settings) else None
     if reason:
         status = DoorStatus.NO_DOOR
-    elif (doubt := _doubt(found, settings)):
+    elif doubt := _doubt(found, settings):
         status, reason = DoorStatus.AMBIGUOUS, doubt
+    elif handle is None and not _is_door_without_handle(found, settings):
+        status, reason = DoorStatus.NO_DOOR, "a flat rectangle without a handle may be anything"
     elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
         reason = "no handle is seen; it is sought " + _where(found)
@@ -29,7 +34,7 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     frame = found.candidate.view.frame
     shape = found.shape
 
-    def place(point: np.ndarray, z: float) -> np.ndarray:
+    def place(point: NDArray[np.float64], z: float) -> NDArray[np.float64]:
         height = 1.0 / found.inverse_height
         return point[0] * frame.right - point[1] * frame.normal + (z - height) * frame.up
 
@@ -43,7 +48,9 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         handle_side="" if handle is None else handle.side,
         handle_kind="" if handle is None else handle.kind,
         camera_pose=_camera_pose(frame, 1.0 / found.inverse_height),
-        corners=np.array([place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]),
+        corners=np.array(
+            [place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]
+        ),
         handle=place(shape.handle, shape.handle_height),
         normal=-panel[0] * frame.right + panel[1] * frame.normal,
         disparity_offset=(
@@ -90,7 +97,9 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     if surfaces.panel_visible < verdict.min_visible:
         return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
     if surfaces.panel_share < verdict.min_panel:
-        return f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
+        return (
+            f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
+        )
     low, high = verdict.height
     top, slack = found.shape.top, 2.0 * np.sqrt(found.covariance[3, 3])
     if found.lintel.z is not None and not low - slack <= top <= high + slack:
@@ -108,6 +117,16 @@ def _doubt(found: Measurement, settings: DoorSettings) -> str:
     return ""
 
 
+def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
+    """Return whether recess, opening or the network tell a door from a poster or a cupboard."""
+    confidence = found.candidate.confidence
+    if confidence >= settings.verdict.min_confidence:
+        return True
+    recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+    deep = recess > settings.verdict.min_step * deviation
+    return found.surfaces.opening != 0.0 or bool(deep and not confidence < _UNLIKELY)
+
+
 def _is_edge(line: Line, settings: DoorSettings) -> bool:
     verdict = settings.verdict
     return line.coverage >= verdict.min_coverage or abs(line.step) >= verdict.min_step
@@ -123,11 +142,11 @@ def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:
 
 
 def _where(found: Measurement) -> str:
-    point = found.shape.handle
-    return f"{found.shape.handle_height:.2f} m above the floor at either edge, {point[1]:.1f} m away"
+    height, away = found.shape.handle_height, found.shape.handle[1]
+    return f"{height:.2f} m above the floor at either edge, {away:.1f} m away"
 
 
-def _camera_pose(frame: WallFrame, height: float) -> np.ndarray:
+def _camera_pose(frame: WallFrame, height: float) -> NDArray[np.float64]:
     """Return the optical frame in the world: z up, x where it looks, the floor below it at 0."""
     forward = np.array([0.0, 0.0, 1.0])
     forward = forward - (forward @ frame.up) * frame.up

@@ -112,9 +112,7 @@ def propose(network: WallNetwork, cells: NDArray[np.float32]) -> Proposals:
         edges = torch.cat([logits.edges, logits.none[:, :2, None]], dim=2).softmax(dim=2)[0]
         handle = torch.cat([logits.handle.reshape(1, -1), logits.none[:, 2:]], dim=1)
         handle = handle.softmax(dim=1)[0, :-1].reshape(logits.handle.shape[1:])
-    return Proposals(
-        edges[0].numpy(), edges[1].numpy(), logits.top[0].numpy(), handle.numpy()
-    )
+    return Proposals(edges[0].numpy(), edges[1].numpy(), logits.top[0].numpy(), handle.numpy())
 
 
 def _finer(values: Tensor, kinds: int) -> Tensor:

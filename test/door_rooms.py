@@ -74,7 +74,6 @@ def see_door(
     height: float = 1.3,
     tilt: float = -0.2,
     camera: Camera | None = None,
-    frame_width: float = 0.06,
 ) -> Seen:
     """Render a door of 0.95 x 2.08 m in a wall, metres and radians.
 
@@ -90,7 +89,7 @@ def see_door(
     pose = attitude(tilt, 0.0)
     pose[:3, 3] = [-2.5, 0.0, height]
     placed = replace(camera or Camera.load("d455"), pose=pose)
-    nuisance = {"recess": recess, "frame_width": frame_width, "frame_proud": 0.0}
+    nuisance = {"recess": recess, "frame_width": 0.0, "frame_proud": 0.0}
     nuisance |= {"handle_length": 0.0, "opening": opening}
     values = np.array([*theta, 0.08, 0.15, 0.0, 0.0])
     fitting = "none" if handle == "none" else "rosette"

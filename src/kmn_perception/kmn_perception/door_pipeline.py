@@ -155,18 +155,18 @@ class DoorPipeline:
         estimate = replace(none, sensor_error=sensor_error)
         return ObjectEstimate(estimate, empty, np.zeros_like(view.valid), False)
 
-    def _verdict(self, found: DoorEstimate, opening: float) -> tuple[Status, str]:
+    def _verdict(self, found: DoorEstimate, is_open: bool) -> tuple[Status, str]:
         """Return what a door is worth as one of the model, and why it is not OK."""
         kind, known = found.handle_kind, self.room.handles
-        if kind and kind not in known:
+        if found.status is DoorStatus.OK and kind not in known:
             return Status.HANDLE_NOT_SEEN, (
                 f"the handle is a {kind}, of which model '{self.model.name}' knows nothing "
                 f"(known: {', '.join(known)})"
             )
-        if found.status is DoorStatus.HANDLE_NOT_SEEN and opening and not found.handle_side:
+        if found.status is DoorStatus.HANDLE_NOT_SEEN and is_open and not found.handle_side:
             return Status.AMBIGUOUS, (
-                f"the door is open by {np.degrees(abs(opening)):.0f} deg, and without a handle in "
-                "sight it is not known which side is hinged"
+                f"the door is open by {np.degrees(abs(found.value(OPENING))):.0f} deg, and without "
+                "a handle in sight it is not known which side is hinged"
             )
         return STATUSES[found.status], found.reason
 
@@ -178,7 +178,8 @@ class DoorPipeline:
         # The finder's opening turns to the right as seen; the model's, away from us.
         opening = found.value(OPENING) * (1.0 if side == "left" else -1.0)
         deviation = max(found.deviation(OPENING), self.finder.settings.fit.closed)
-        status, reason = self._verdict(found, opening)
+        is_open = abs(opening) > SIGNIFICANT * deviation
+        status, reason = self._verdict(found, is_open)
         kind = found.handle_kind if found.handle_kind in self.room.handles else ""
         mask, truncated = _panel_pixels(found, view, camera)
         points = view.points[mask]

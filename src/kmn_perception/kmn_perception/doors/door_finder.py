@@ -45,7 +45,7 @@ class DoorFinder:
             # By the handle's usual height the camera is somewhere else above the floor.
             walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
             best = self._search(frame, walls)
-        if frame.up is None and best.found:
+        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
             doubt = doubt_upright(best, walls.planes, walls.up, settings)
             best = DoorEstimate.none(doubt) if doubt else best
         return best

@@ -7,6 +7,7 @@ EXECUTABLES = {
     "make_example_bag": ("kmn_perception.bags.example_bag", ""),
     "demo_bag": ("kmn_perception.bags.demo", ""),
     "train": ("kmn_perception.training.train", "training"),
+    "train_doors": ("kmn_perception.training.train_doors", "training"),
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),

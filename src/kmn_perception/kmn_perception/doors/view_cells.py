@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.lines import gaussian_steps
+from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
 
 ROWS = 64  # cells above each other, from the view's top
@@ -94,3 +97,18 @@ def _strongest(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
     """Return the value of largest size along an axis."""
     at = np.expand_dims(np.abs(values).argmax(axis=axis), axis)
     return np.take_along_axis(values, at, axis).squeeze(axis)
+
+
+def describe_cells(settings: DoorSettings) -> dict[str, Any]:
+    """Return how cells are made, as their network's weight file must agree on it: by name."""
+    view, noise = settings.view, settings.fit.pixel_noise
+    return {
+        "rows": ROWS,
+        "pixels": [_HIGH, _WIDE],
+        "pixel": view.pixel,
+        "heights": list(view.heights),
+        "smoothing": _SMOOTHING,
+        "step": _STEP,
+        "offset": _OFFSET * noise,
+        "before": view.before * noise,
+    }

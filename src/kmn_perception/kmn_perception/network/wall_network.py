@@ -108,10 +108,14 @@ class Proposals(NamedTuple):
 def propose(network: WallNetwork, cells: NDArray[np.float32]) -> Proposals:
     """Return what a network proposes for the cells (CHANNELS, ROWS, N) of one view."""
     with torch.inference_mode():
-        logits = network(torch.from_numpy(cells)[None])
-        edges = torch.cat([logits.edges, logits.none[:, :2, None]], dim=2).softmax(dim=2)[0]
-        handle = torch.cat([logits.handle.reshape(1, -1), logits.none[:, 2:]], dim=1)
-        handle = handle.softmax(dim=1)[0, :-1].reshape(logits.handle.shape[1:])
+        return proposals_of(network(torch.from_numpy(cells)[None]))
+
+
+def proposals_of(logits: Logits) -> Proposals:
+    """Return what the logits of one view (B = 1) propose."""
+    edges = torch.cat([logits.edges, logits.none[:, :2, None]], dim=2).softmax(dim=2)[0]
+    handle = torch.cat([logits.handle.reshape(1, -1), logits.none[:, 2:]], dim=1)
+    handle = handle.softmax(dim=1)[0, :-1].reshape(logits.handle.shape[1:])
     return Proposals(edges[0].numpy(), edges[1].numpy(), logits.top[0].numpy(), handle.numpy())
 
 

@@ -1,0 +1,130 @@
+"""Train the network that proposes doors in walls, on rendered rooms, and write its weight file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import shutil
+import signal
+import sys
+import warnings
+from typing import Any
+
+import torch
+
+from kmn_perception.command_line.arguments import output_file, output_folder, whole_number
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.view_cells import describe_cells
+from kmn_perception.network import wall_weights
+from kmn_perception.network.wall_network import WallNetwork
+from kmn_perception.rooms.settings import RoomSettings
+from kmn_perception.training.run import Run, RunError
+from kmn_perception.training.settings import SharedSettings
+from kmn_perception.training.wall.fitting import Fitting
+from kmn_perception.training.wall.settings import WallTrainingSettings
+from kmn_perception.training.wall.shards import make_shards, read_shards
+
+
+def arguments(argv: list[str] | None = None) -> argparse.Namespace:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(prog="train_doors", description=__doc__)
+    positive = whole_number(1)
+    parser.add_argument("--out", required=True, type=output_file, help="weight file to write")
+    parser.add_argument(
+        "--config",
+        default=wall_weights.MODEL,
+        help="name or YAML file of the settings (default: those of the shipped weights)",
+    )
+    parser.add_argument("--rooms", type=whole_number(2), help="in place of the settings'")
+    parser.add_argument("--epochs", type=positive, help="in place of the settings'")
+    parser.add_argument("--seed", type=whole_number(0), help="in place of the settings'")
+    parser.add_argument(
+        "--processes", type=positive, default=1, help="that render, then threads of torch"
+    )
+    parser.add_argument(
+        "--run", type=output_folder, help="folder of the run (default: beside --out)"
+    )
+    parser.add_argument("--restart", action="store_true", help="discard an earlier run")
+    return parser.parse_args(argv)
+
+
+def settings_of(options: argparse.Namespace) -> WallTrainingSettings:
+    """Return the settings of the file with those of the command line in their place."""
+    settings = WallTrainingSettings.load(options.config)
+    data, fit = settings.data, settings.fit
+    return dataclasses.replace(
+        settings,
+        seed=settings.seed if options.seed is None else options.seed,
+        data=data._replace(rooms=options.rooms or data.rooms),
+        fit=fit._replace(epochs=options.epochs or fit.epochs),
+    )
+
+
+def train(options: argparse.Namespace) -> None:
+    """Train as the options say, and write the weight file."""
+    settings, doors = settings_of(options), DoorSettings.load()
+    folder = options.run or options.out.with_suffix(".run")
+    if options.restart and folder.exists():
+        shutil.rmtree(folder)
+    cells = describe_cells(doors)
+    known = {"training": _plain(settings), "cells": cells}
+    seconds = SharedSettings.load().checkpoint_seconds
+    run = Run(folder, {**known, "depends_on": _data_depend_on(doors)}, seconds)
+    for interruption in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(interruption, run.interrupt)
+    files = make_shards(
+        folder / "data", settings, doors, options.processes, lambda: run.interrupted
+    )
+    samples, held_out = read_shards(files, settings)
+    print(f"{len(samples)} views to train on, {len(held_out)} held out; the run: {folder}")
+    torch.set_num_threads(options.processes)
+    torch.manual_seed(settings.seed)
+    network = WallNetwork(settings.width)
+    high, wide = (cells["pixel"] * count for count in cells["pixels"])
+    fitting = Fitting(network, samples, held_out, settings, (high, wide), run)
+    fitting.fit()
+    state = fitting.state
+    metadata = {
+        "training": known["training"],
+        "views": len(samples),
+        "errors": {**state.epochs[-1], "samples": "rooms that never trained"},
+        "epochs": state.epochs,
+        "seconds": round(state.seconds),
+    }
+    wall_weights.save(options.out, wall_weights.WallWeights(network, cells, metadata))
+    print(f"wrote {options.out}")
+
+
+def _data_depend_on(doors: DoorSettings) -> dict[str, Any]:
+    """Return the settings of others on which the samples depend: a run goes on with the same."""
+    parts = {
+        name: getattr(doors, name) for name in ("planes", "vertical", "floor", "view", "prior")
+    }
+    return {"doors": {name: _plain(part) for name, part in parts.items()},
+            "rooms": _plain(RoomSettings.load())}  # fmt: skip
+
+
+def _plain(settings: Any) -> Any:
+    """Return settings as dictionaries, lists and values."""
+    if dataclasses.is_dataclass(settings):
+        fields = dataclasses.fields(settings)
+        return {field.name: _plain(getattr(settings, field.name)) for field in fields}
+    if hasattr(settings, "_asdict"):
+        return {name: _plain(value) for name, value in settings._asdict().items()}
+    if isinstance(settings, dict):
+        return {name: _plain(value) for name, value in settings.items()}
+    return list(settings) if isinstance(settings, tuple) else settings
+
+
+def main() -> None:
+    """Run the executable; an interrupted run is resumed by the same command."""
+    options = arguments()
+    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
+    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
+    try:
+        train(options)
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the same command resumes from where it was")
+    except (ConfigurationError, OSError, RunError) as error:
+        sys.exit(f"train_doors: {error}")

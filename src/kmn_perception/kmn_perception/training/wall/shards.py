@@ -1,0 +1,161 @@
+"""The samples of many rooms in files, so that an interrupted run goes on from them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import multiprocessing
+import signal
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+from kmn_perception.configuration.output import replacing
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.network.threads import use_one_thread
+from kmn_perception.training.run import RunError
+from kmn_perception.training.wall.samples import Sample, is_validation, samples_of
+from kmn_perception.training.wall.settings import WallTrainingSettings
+from kmn_perception.training.wall.targets import Target
+
+_ROOMS_OF_A_PROCESS = 20  # for fewer its start, some seconds, does not pay
+
+_of_process: tuple[WallTrainingSettings, DoorSettings]  # of a started process
+
+
+def make_shards(
+    folder: Path,
+    settings: WallTrainingSettings,
+    doors: DoorSettings,
+    processes: int,
+    interrupted: Callable[[], bool],
+) -> list[Path]:
+    """Render the rooms whose files are not there yet, and return all files.
+
+    Raises
+    ------
+    RunError
+        If a file cannot be written.
+    KeyboardInterrupt
+        When the run was interrupted.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    rooms, size = settings.data.rooms, settings.data.shard
+    shards = [range(first, min(first + size, rooms)) for first in range(0, rooms, size)]
+    files = {folder / f"rooms{shard[0]:07d}.npz": shard for shard in shards}
+    missing = {file: shard for file, shard in files.items() if not file.exists()}
+    wanted = list(itertools.chain.from_iterable(missing.values()))
+    useful = math.ceil(len(wanted) / _ROOMS_OF_A_PROCESS)
+    bar: tqdm[Any] = tqdm(total=rooms, initial=rooms - len(wanted), unit=" rooms", desc="rooms")
+    with bar, _Renderers(settings, doors, min(processes, useful)) as renderers:
+        rendered = renderers.samples(wanted)
+        for file, shard in missing.items():
+            samples: list[list[Sample]] = []
+            for found in itertools.islice(rendered, len(shard)):
+                samples.append(found)
+                bar.update()
+                if interrupted():
+                    raise KeyboardInterrupt
+            _write(file, shard, samples)
+    return list(files)
+
+
+def read_shards(
+    files: Sequence[Path], settings: WallTrainingSettings
+) -> tuple[list[Sample], list[Sample]]:
+    """Return the samples that train and those that measure.
+
+    Raises
+    ------
+    RunError
+        If a file is damaged, or there is nothing to train on or to measure by.
+    """
+    training: list[Sample] = []
+    validation: list[Sample] = []
+    for file in files:
+        for room, sample in _read(file):
+            (validation if is_validation(room, settings.data) else training).append(sample)
+    if not training or not validation:
+        raise RunError(
+            f"{settings.data.rooms} rooms give {len(training)} views to train on and "
+            f"{len(validation)} to measure by; ask for more with --rooms"
+        )
+    return training, validation
+
+
+def _write(file: Path, rooms: Sequence[int], samples: Sequence[Sequence[Sample]]) -> None:
+    flat = [sample for found in samples for sample in found]
+    cells = [sample.cells for sample in flat]
+    try:
+        with replacing(file) as new:
+            np.savez_compressed(
+                new,
+                cells=np.concatenate(cells, axis=2) if cells else np.zeros((0, 0, 0), np.int8),
+                columns=np.array([part.shape[2] for part in cells], np.int64),
+                targets=np.array([sample.target for sample in flat]).reshape(
+                    -1, len(Target._fields)
+                ),
+                rooms=np.repeat(rooms, [len(found) for found in samples]),
+            )
+    except OSError as error:
+        raise RunError(
+            f"cannot write {file}: {error.strerror}; the same command goes on from the last "
+            "file when there is room again"
+        ) from error
+
+
+def _read(file: Path) -> Iterator[tuple[int, Sample]]:
+    """Yield the room of each sample, and the sample."""
+    try:
+        with np.load(file) as arrays:
+            ends = np.cumsum(arrays["columns"])
+            cells = np.split(arrays["cells"], ends[:-1], axis=2) if len(ends) else []
+            targets, rooms = arrays["targets"], arrays["rooms"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise RunError(
+            f"{file} is damaged ({error}); remove it to render its rooms anew"
+        ) from error
+    for room, part, target in zip(rooms, cells, targets, strict=True):
+        yield int(room), Sample(part, Target(*map(float, target)))
+
+
+class _Renderers:
+    """Processes that render rooms; one renders in this process."""
+
+    def __init__(self, settings: WallTrainingSettings, doors: DoorSettings, count: int) -> None:
+        self._arguments, self._count = (settings, doors), count
+        self._pool: Any = None
+
+    def __enter__(self) -> _Renderers:
+        if self._count > 1:
+            context = multiprocessing.get_context("spawn")
+            self._pool = context.Pool(self._count, _start, self._arguments)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.terminate()
+
+    def samples(self, rooms: Sequence[int]) -> Iterator[list[Sample]]:
+        """Yield the samples of each room, in this order."""
+        if self._pool is not None:
+            yield from self._pool.imap(_samples, rooms)
+        else:
+            yield from (samples_of(room, *self._arguments) for room in rooms)
+
+
+def _start(settings: WallTrainingSettings, doors: DoorSettings) -> None:
+    global _of_process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
+    cv2.setNumThreads(1)
+    use_one_thread()
+    _of_process = settings, doors
+
+
+def _samples(room: int) -> list[Sample]:
+    return samples_of(room, *_of_process)

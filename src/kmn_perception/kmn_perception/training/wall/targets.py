@@ -1,0 +1,107 @@
+"""What the network is to find in a view of a wall, in the cells that it sees."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.doors.view_cells import cell_of, height_of
+from kmn_perception.doors.wall_view import WallView
+from kmn_perception.network.wall_network import KINDS
+from kmn_perception.rooms.design import seen_edges
+from kmn_perception.rooms.rendering import Images
+from kmn_perception.rooms.room import Door, Room
+from kmn_perception.training.wall.settings import TargetSettings
+
+NO_HANDLE = float(len(KINDS))
+_GRAZING = 0.05  # metres before the camera along the wall's normal, for a meaningful projection
+
+
+class Target(NamedTuple):
+    """The door in a view of a wall; cells are counted from the middle of the first one.
+
+    Attributes
+    ----------
+    door
+        1 where the view shows the wall of a door, else 0.
+    left, right
+        Columns of its upright edges; NaN where they are not seen.
+    top
+        Its row.
+    handle_row, handle_column
+        Of the handle's middle.
+    kind
+        Of the handle: an index of ``KINDS``, or ``NO_HANDLE``.
+    """
+
+    door: float
+    left: float = np.nan
+    right: float = np.nan
+    top: float = np.nan
+    handle_row: float = np.nan
+    handle_column: float = np.nan
+    kind: float = np.nan
+
+    def shifted(self, columns: float) -> Target:
+        """Return the target in a window that begins so many columns further right."""
+        return self._replace(
+            left=self.left - columns,
+            right=self.right - columns,
+            handle_column=self.handle_column - columns,
+        )
+
+    def mirrored(self, columns: int) -> Target:
+        """Return the target in the mirrored view of so many columns."""
+        last = columns - 1
+        return self._replace(
+            left=last - self.right, right=last - self.left, handle_column=last - self.handle_column
+        )
+
+
+def target_of(view: WallView, room: Room, images: Images, settings: TargetSettings) -> Target:
+    """Return what a view of a rendered room shows, as the camera projects it onto the wall."""
+    door, frame = room.door, view.frame
+    if door is None or not _is_shown(view, door, settings):
+        return Target(0.0)
+    seen = seen_edges(door, room, images.bodies)
+    corner = door.corners
+    # The edge of a recessed door is that of its frame or of its panel: between both.
+    recess = 0.5 * max(door.nuisance["recess"], 0.0) * frame.normal
+    columns = {}
+    for side in ("left", "right"):
+        edge = (corner[f"top_{side}"] + corner[f"bottom_{side}"]) / 2.0 + recess
+        columns[side] = _cell(view, edge)[1] if seen[side] >= settings.seen.edge else np.nan
+    top = np.nan
+    if seen["top"] >= settings.seen.top:
+        rows = [_cell(view, corner[name] + recess)[0] for name in ("top_left", "top_right")]
+        top = float(np.mean(rows))
+    if door.handle_centre is None:
+        return Target(1.0, **columns, top=top, kind=NO_HANDLE)
+    row, column = _cell(view, door.handle_centre)
+    kind = float(KINDS.index(door.handle))
+    return Target(1.0, **columns, top=top, handle_row=row, handle_column=column, kind=kind)
+
+
+def _is_shown(view: WallView, door: Door, settings: TargetSettings) -> bool:
+    """Tell whether a view's plane is about the door's own."""
+    normal, corner = view.frame.normal, door.corners
+    middle = np.mean(list(corner.values()), axis=0)
+    along = corner["bottom_right"] - corner["bottom_left"]
+    near = abs(middle @ normal + view.frame.distance) <= settings.max_distance
+    return bool(near and abs(along @ normal) <= settings.max_turn * np.linalg.norm(along))
+
+
+def _cell(view: WallView, point: NDArray[np.float64]) -> tuple[float, float]:
+    """Return row and column of the cells in which a point (3,) of the optical frame is seen."""
+    frame = view.frame
+    ahead = -float(point @ frame.normal)
+    if ahead < _GRAZING:
+        return np.nan, np.nan
+    on_wall = point * (frame.distance / ahead)
+    pixel = float(view.s[1] - view.s[0])
+    first, second = height_of(view, np.array([0.0, 1.0]))
+    row = (on_wall @ frame.up + frame.height - first) / (second - first)
+    column = cell_of(view, (float(on_wall @ frame.right) - float(view.s[0])) / pixel)
+    return float(row), column

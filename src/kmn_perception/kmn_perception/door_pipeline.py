@@ -175,8 +175,7 @@ class DoorPipeline:
         values, covariance = _move(found, camera.pose)
         theta, gamma = self.model.split(values)
         side = found.handle_side or "right"
-        # The finder's opening turns to the right as seen; the model's, away from us.
-        opening = found.value(OPENING) * (1.0 if side == "left" else -1.0)
+        opening = found.value(OPENING)
         deviation = max(found.deviation(OPENING), self.finder.settings.fit.closed)
         is_open = abs(opening) > SIGNIFICANT * deviation
         status, reason = self._verdict(found, is_open)

@@ -158,7 +158,7 @@ def test_no_door_is_invented(talk: DoorTalk, restored: None, kind: str) -> None:
     assert answer.reason
 
 
-def test_weights_are_refused_where_there_is_no_network(talk: DoorTalk) -> None:
+def test_weights_of_another_network_are_refused(talk: DoorTalk) -> None:
     result = talk.client.set(weights="door")
     assert not result.successful
-    assert "'weights' must be empty" in result.reason
+    assert "not one that proposes doors in walls" in result.reason

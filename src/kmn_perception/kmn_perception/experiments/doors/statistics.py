@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from kmn_perception.experiments.doors.errors import UNITS, DoorErrors
 from kmn_perception.experiments.doors.experiment import (
-    DEPTH_ALONE,
     MODES,
     WITH_COLOUR,
     DoorResult,
@@ -42,7 +41,7 @@ def statistics(results: Sequence[DoorResult], settings: ExperimentSettings) -> S
             name: _of_baseline(results, [result.baselines[name] for result in results])
             for name in (results[0].baselines if results else ())
         },
-        DEPTH_ALONE: by_mode[DEPTH_ALONE],
+        **{mode: by_mode[mode] for mode in MODES if mode != WITH_COLOUR},
         "per_frame": {result.name: _of_frame(result) for result in results},
     }
 

@@ -9,13 +9,22 @@ import numpy as np
 
 from kmn_perception.command_line.columns import columns
 from kmn_perception.experiments.doors.errors import UNITS
-from kmn_perception.experiments.doors.experiment import DEPTH_ALONE, WITH_COLOUR, DoorResult
+from kmn_perception.experiments.doors.experiment import (
+    DEPTH_ALONE,
+    WITH_COLOUR,
+    WITHOUT_NETWORK,
+    DoorResult,
+)
 from kmn_perception.experiments.doors.statistics import ERRORS
 from kmn_perception.experiments.statistics import NONE, Statistics, text
 
 SHOWN = ("left", "right", "width", "top", "yaw", "handle_up", "handle_along", "opening")
 DIGITS = {"mm": 1, "deg": 2}
-NAMES = {WITH_COLOUR: "depth and colour", DEPTH_ALONE: "depth alone"}
+NAMES = {
+    WITH_COLOUR: "depth and colour",
+    WITHOUT_NETWORK: "the same without network",
+    DEPTH_ALONE: "depth alone",
+}
 
 
 def frame_table(results: Sequence[DoorResult], mode: str) -> str:
@@ -51,7 +60,9 @@ def method_table(summary: Statistics) -> str:
     """Return a line for each mode and baseline: medians and 95th percentiles."""
     heads = [key.rpartition("_")[0].replace("handle_", "") for key in ERRORS]
     rows = [["median / 95 %", "found", "wrong", "not there", *heads, "in 95 %", "ms"]]
-    methods = {NAMES[WITH_COLOUR]: summary, NAMES[DEPTH_ALONE]: summary[DEPTH_ALONE]}
+    methods = {
+        name: summary if mode == WITH_COLOUR else summary[mode] for mode, name in NAMES.items()
+    }
     for name, method in {**methods, **summary["baselines"]}.items():
         doors = method["frames"] - method["negatives"]
         rows.append(

@@ -151,6 +151,39 @@ def test_depth_image_and_cloud_show_the_true_door(client: SimClient) -> None:
     assert np.median(np.abs(depth - door)[seen]) < 1e-3
 
 
+@pytest.mark.parametrize(("encoding", "channels"), [("rgb8", 3), ("mono8", 1)])
+def test_the_image_has_the_pixels_stamp_and_frame_of_the_depth(
+    client: SimClient, encoding: str, channels: int
+) -> None:
+    colours: list[Image] = []
+    client.images.clear()
+    subscriptions = [
+        client.create_subscription(Image, name, kept.append, 10)
+        for name, kept in (("depth/image", client.images), ("image", colours))
+    ]
+    client.graph.wait_for(lambda: client.images)
+    assert not colours  # as long as nobody asks for it
+    assert client.set(image=True, image_encoding=encoding, room=True).successful
+
+    def both() -> tuple[Image, Image] | None:
+        depths = {seconds(image.header.stamp): image for image in client.images}
+        stamps = [seconds(image.header.stamp) for image in colours]
+        return next(
+            ((depths[t], image) for t, image in zip(stamps, colours, strict=True) if t in depths),
+            None,
+        )
+
+    depth, image = client.graph.wait_for(both)
+    for subscription in subscriptions:
+        client.destroy_subscription(subscription)
+    assert client.set(image=False, image_encoding="rgb8", room=False).successful
+    assert (image.encoding, image.header.frame_id) == (encoding, depth.header.frame_id)
+    assert (image.width, image.height) == (depth.width, depth.height)
+    assert image.step == channels * image.width
+    pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, -1)
+    assert len(np.unique(pixels)) > 5
+
+
 def test_the_world_changes_by_parameters_while_a_trajectory_runs(client: SimClient) -> None:
     client.trajectory.publish(trajectory((20.0, 0.0, -1.0)))
     values = [0.1, 0.2, 0.3, 0.1, 0.0, 0.01, 0.02]
@@ -171,6 +204,10 @@ def test_the_world_changes_by_parameters_while_a_trajectory_runs(client: SimClie
         ({"placement": "somewhere"}, "'placement' must be one of"),
         ({"model": "elephant"}, "elephant"),
         ({"noise": "loud"}, "'noise' must be one of"),
+        ({"model": "box_a", "room": True}, "'room' is for doors"),
+        ({"room": True, "wall": True}, "a 'room' has its own frame and wall"),
+        ({"recess": 0.5}, "recess"),
+        ({"image_encoding": "bgr8"}, "'image_encoding' must be one of"),
         ({"camera": "nowhere"}, "nowhere"),
         ({"camera_rate": 1000.0}, "camera_rate"),
         ({"renderer": "software"}, "renderer"),

@@ -88,6 +88,7 @@ def test_its_planner_has_the_model_that_it_is_given(graph: Any, tmp_path: Path) 
         ("model:=box_a", "'model' must be that of a door"),
         ("retries:=-1", "retries"),
         ("world_frame:=''", "'world_frame' is empty"),
+        ("surroundings:=moat", "'surroundings' must be one of none, wall"),
     ],
 )
 def test_a_wrong_parameter_ends_it_with_the_reason(domain: int, parameter: str, text: str) -> None:

@@ -27,6 +27,8 @@ FIELDS = {
         "header": "std_msgs/Header",
         "model": "string",
         "id": "uint32",
+        "alternative": "string",
+        "mirrored": "boolean",
         "truncated": "boolean",
         "theta_names": "sequence<string>",
         "theta": "sequence<double>",
@@ -34,6 +36,12 @@ FIELDS = {
         "gamma": "sequence<double>",
         "covariance": "sequence<double>",
         "transform": "double[16]",
+        "joint_names": "sequence<string>",
+        "joint_positions": "sequence<double>",
+        "joint_deviations": "sequence<double>",
+        "surroundings_names": "sequence<string>",
+        "surroundings": "sequence<double>",
+        "surroundings_deviations": "sequence<double>",
         "iterations": "uint32",
         "converged": "boolean",
         "residual": "double",
@@ -69,6 +77,8 @@ values = st.fixed_dictionaries(
     {
         "model": text,
         "id": uint32,
+        "alternative": text,
+        "mirrored": st.booleans(),
         "truncated": st.booleans(),
         "theta_names": st.lists(text, max_size=4),
         "theta": numbers,
@@ -76,6 +86,12 @@ values = st.fixed_dictionaries(
         "gamma": numbers,
         "covariance": numbers,
         "transform": st.lists(st.floats(), min_size=16, max_size=16),
+        "joint_names": st.lists(text, max_size=2),
+        "joint_positions": numbers,
+        "joint_deviations": numbers,
+        "surroundings_names": st.lists(text, max_size=2),
+        "surroundings": numbers,
+        "surroundings_deviations": numbers,
         "iterations": uint32,
         "converged": st.booleans(),
         "residual": st.floats(),
@@ -109,7 +125,8 @@ def rosidl_message(
 def rosbags_message(values: dict[str, Any], stamp: tuple[int, int], frame: str) -> Any:
     time = TYPES.types["builtin_interfaces/msg/Time"](*stamp)
     header = TYPES.types["std_msgs/msg/Header"](time, frame)
-    vectors = ("theta", "gamma", "covariance", "transform")
+    states = ("joint_positions", "joint_deviations", "surroundings", "surroundings_deviations")
+    vectors = ("theta", "gamma", "covariance", "transform", *states)
     arrays = {name: np.array(values[name], dtype=np.float64) for name in vectors}
     return TYPES.types[TYPE](header, **{**values, **arrays})
 
@@ -128,7 +145,8 @@ def test_fields_are_those_of_the_contract(interface: Any) -> None:
 
 def test_status_constants() -> None:
     names = ["OK", "NO_OBJECT", "TOO_FEW_POINTS", "NOT_CONVERGED", "OUT_OF_LIMITS"]
-    assert [getattr(MorphingParameters, name) for name in names] == [0, 1, 2, 3, 4]
+    names += ["HANDLE_NOT_SEEN", "AMBIGUOUS"]
+    assert [getattr(MorphingParameters, name) for name in names] == list(range(7))
 
 
 @pytest.mark.parametrize(
@@ -157,5 +175,5 @@ def test_rosbags_reads_what_rosidl_writes(
     # rmw_fastrtps counts an alignment for empty sequences which Fast CDR does not write, so that
     # unused bytes may follow the message; rosbags knows the exact length.
     exact = len(TYPES.serialize_cdr(rosbags_message(values, stamp, frame), TYPE))
-    assert exact <= len(cdr) < exact + 16
+    assert exact <= len(cdr) < exact + 32
     assert_same(TYPES.deserialize_cdr(cdr[:exact], TYPE), values, stamp, frame)

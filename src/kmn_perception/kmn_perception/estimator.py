@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ class Status(IntEnum):
     TOO_FEW_POINTS = 2
     NOT_CONVERGED = 3
     OUT_OF_LIMITS = 4
+    HANDLE_NOT_SEEN = 5
+    AMBIGUOUS = 6
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,14 @@ class EstimatorSettings:
     refine: bool
 
 
+class Quantity(NamedTuple):
+    """The state of a joint, or a parameter of the surroundings, with its standard deviation."""
+
+    name: str
+    value: float
+    deviation: float
+
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Morphing parameters of one observation; NaN where there is no estimate.
@@ -85,6 +96,13 @@ class Estimate:
         Number of points.
     status, reason
         What it is worth; the reason is empty when the status is OK.
+    alternative, mirrored
+        Kind of the handle, where the model has several and one was seen; and whether the object is
+        the model mirrored in y, which then belongs to ``transform``.
+    joints, surroundings
+        What else was estimated, in units of the model.
+    sensor_error
+        What the frame tells about an error of the sensor, for people to read.
     """
 
     theta: NDArray[np.float64]
@@ -97,6 +115,11 @@ class Estimate:
     points_used: int
     status: Status
     reason: str
+    alternative: str = ""
+    mirrored: bool = False
+    joints: tuple[Quantity, ...] = ()
+    surroundings: tuple[Quantity, ...] = ()
+    sensor_error: str = ""
 
     @classmethod
     def none(cls, model: KinematicModel, points: int, status: Status, reason: str) -> Estimate:

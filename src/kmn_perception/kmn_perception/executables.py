@@ -10,6 +10,7 @@ EXECUTABLES = {
     "train_doors": ("kmn_perception.training.train_doors", "training"),
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
+    "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "benchmark": ("kmn_perception.benchmark", ""),

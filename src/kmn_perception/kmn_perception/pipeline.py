@@ -3,52 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
-from kmn_perception.scene.camera_pose import CameraPose, NoCameraPoseError, find_camera_pose
+from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
+from kmn_perception.scene.camera_pose import NoCameraPoseError, find_camera_pose
+from kmn_perception.scene.connected_pixels import share_of_holes
 from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.free_space import free_space, free_space_of_cloud, is_truncated
 from kmn_perception.scene.intrinsics import camera_as_dense
 from kmn_perception.scene.occlusion import find_occluded_pairs
-from kmn_perception.scene.segmentation import SegmentationSettings, Segments, segment
-from kmn_perception.scene.settings import SceneSettings
+from kmn_perception.scene.segmentation import Segments, segment
 from kmn_perception.scene.stacking import stands_on
-from kmn_perception.scene.support_plane import SupportPlaneSettings, find_support_plane
+from kmn_perception.scene.support_plane import find_support_plane
 
 MIN_PARTS = 3  # two parts of an object, and what is in front of them
-
-
-@dataclass(frozen=True, eq=False)
-class PipelineSettings:
-    """How a frame becomes objects in the world frame.
-
-    Attributes
-    ----------
-    camera_pose
-        The model's canonical one, the given one, or estimated from the support plane.
-    given_pose
-        (4, 4) optical frame in the world frame, metres.
-    plane
-        What counts as a support plane.
-    background
-        The stages of the background removal.
-    scene
-        How objects are told apart.
-    """
-
-    camera_pose: CameraPose
-    given_pose: NDArray[np.float64]
-    plane: SupportPlaneSettings
-    background: SegmentationSettings
-    scene: SceneSettings
 
 
 class ObjectView(NamedTuple):
@@ -69,15 +46,6 @@ class ObjectView(NamedTuple):
     truncated: bool
 
 
-class ObjectEstimate(NamedTuple):
-    """An estimate with what it rests on, see `ObjectView`."""
-
-    estimate: Estimate
-    observation: Observation
-    mask: NDArray[np.bool_]
-    truncated: bool
-
-
 class MorphPipeline:
     """Camera pose, background removal and estimation, one after the other.
 
@@ -90,6 +58,22 @@ class MorphPipeline:
     def __init__(self, estimator: MorphEstimator, settings: PipelineSettings) -> None:
         self.estimator, self.settings = estimator, settings
 
+    @property
+    def model(self) -> KinematicModel:
+        """What is estimated."""
+        return self.estimator.model
+
+    @property
+    def uses_image(self) -> bool:
+        """Grey values tell the network nothing."""
+        return False
+
+    def configured(self, settings: PipelineSettings, estimator: EstimatorSettings) -> MorphPipeline:
+        """Return the pipeline with other settings, which shares model and network."""
+        old = self.estimator
+        new = MorphEstimator(old.model, old.network, estimator, old.refinement)
+        return MorphPipeline(new, settings)
+
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
         model, scene = self.estimator.model, self.settings.scene
@@ -98,10 +82,11 @@ class MorphPipeline:
         # At any angle that is not 0 the surface's rounding errors have concave edges.
         split = replace(self.settings.background, cluster=True, cluster_concave_angle=1e-9)
         for cloud in (points, points.reshape(-1, 3)):
-            segment(cloud, model.camera.pose, np.zeros(3), split, scene.concave_edges)
+            segment(cloud, model.camera.pose, np.zeros(3), split, scene)
         labels = np.zeros(points.shape[:-1], dtype=np.int32)
-        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0)
+        around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0, (0.0, 0.0))
         mask = np.isfinite(points[..., 2])
+        share_of_holes(points, labels, 1, scene.max_gap)
         is_truncated(mask, around.free_depth)
         find_occluded_pairs([mask], around.free_depth, scene.occlusion.min_rows)
         self.estimator.warm_up()
@@ -141,7 +126,7 @@ class MorphPipeline:
         view = view.placed(pose, self.settings.scene.intrinsics)
         to_world = np.eye(4) if view.in_world else pose
         background, scene = self.settings.background, self.settings.scene
-        segments = segment(view.points, to_world, pose[:3, 3], background, scene.concave_edges)
+        segments = segment(view.points, to_world, pose[:3, 3], background, scene)
         sizes = np.bincount(segments.labels + 1, minlength=segments.objects + 1)[1:]
         too_small = sizes < self.estimator.settings.min_points
         labels = np.argsort(too_small, kind="stable")[:max_objects].tolist()
@@ -162,30 +147,38 @@ class MorphPipeline:
         """Return what is seen of objects in the pixels of a camera."""
         image = segments.labels.reshape(view.points.shape[:-1])
         to_camera = camera.world_to_camera @ to_world
-        border_run = self.settings.scene.border_run
-        around = free_space(view.points, image, to_camera, to_world, floor, border_run)
+        scene = self.settings.scene
+        shadow = camera.fx * scene.shadow.baseline, scene.shadow.slack
+        around = free_space(
+            view.points, image, to_camera, to_world, floor, scene.border_run, shadow
+        )
+        holes = share_of_holes(view.points, image, segments.objects, scene.max_gap)
         depth = view.depth()
         views = []
         for label in labels:
             mask = image == label
-            seen = np.where(mask, depth, np.float32(np.nan))
-            observation = Observation(segments.of_object(label), camera, floor, around, seen)
+            if holes[label] > 1.0 - scene.intrinsics.dense:
+                observation = self._sparse(segments, label, camera, floor)
+            else:
+                seen = np.where(mask, depth, np.float32(np.nan))
+                observation = Observation(segments.of_object(label), camera, floor, around, seen)
             views.append(ObjectView(observation, mask, is_truncated(mask, around.free_depth)))
         return views
 
     def _observe_cloud(
         self, segments: Segments, label: int, pose: NDArray[np.float64], floor: float
     ) -> ObjectView:
-        """Return what is seen of an object among unorganised points.
-
-        Its camera has the canonical view, and as many pixels as the points are dense.
-        """
-        seen = segments.of_object(label)
+        """Return what is seen of an object among unorganised points, in the canonical view."""
         canonical = replace(self.estimator.model.camera, pose=pose)
-        sensor = camera_as_dense(seen, canonical, self.settings.scene.intrinsics)
+        observation = self._sparse(segments, label, canonical, floor)
+        return ObjectView(observation, segments.labels == label, False)
+
+    def _sparse(self, segments: Segments, label: int, camera: Camera, floor: float) -> Observation:
+        """Return what a camera of as many pixels as the points are dense sees of an object."""
+        seen = segments.of_object(label)
+        sensor = camera_as_dense(seen, camera, self.settings.scene.intrinsics)
         beside = free_space_of_cloud(segments.points, sensor, floor)
-        mask = segments.labels == label
-        return ObjectView(Observation(seen, sensor, floor, beside), mask, False)
+        return Observation(seen, sensor, floor, beside)
 
     def camera_pose(self, view: DepthView) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the optical frame in the world, see `find_camera_pose`."""
@@ -209,8 +202,9 @@ class MorphPipeline:
     def _joined(self, objects: list[ObjectEstimate]) -> list[ObjectEstimate]:
         """Join what an occluder divides in the image, if one model explains both parts."""
         around = objects[0].observation.free_space
-        if around is None or objects[0].mask.ndim != 2 or len(objects) < MIN_PARTS:
-            return objects  # unorganised points have no image in which anything divides them
+        sparse = any(found.observation.depth is None for found in objects)
+        if around is None or sparse or len(objects) < MIN_PARTS:
+            return objects  # sparse points have no image in which anything divides them
         owner = list(range(len(objects)))  # the first of the parts to which an object belongs
         pairs = find_occluded_pairs(
             [found.mask for found in objects],
@@ -247,10 +241,10 @@ class MorphPipeline:
         self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]
     ) -> ObjectEstimate:
         """Refuse the estimate of an object that stands on another one."""
-        points, cubes = found.observation.points, self._bodies(found)
+        points, cubes = found.observation.points, self._found_bodies(found)
         stacking = self.settings.scene.stacking
         for other in objects:
-            if other is not found and stands_on(points, cubes, self._bodies(other), stacking):
+            if other is not found and stands_on(points, cubes, self._found_bodies(other), stacking):
                 reason = "the object stands on another one, not on the support plane"
                 status = Status.NOT_CONVERGED
                 return found._replace(
@@ -258,9 +252,13 @@ class MorphPipeline:
                 )
         return found
 
-    def _bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
-        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
-        estimate = found.estimate
-        if estimate.status is not Status.OK:
+    def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate, none where there are no parameters."""
+        if not np.isfinite([*estimate.theta, *estimate.gamma]).all():
             return np.empty((0, 4, 4))
-        return self.estimator.model.unit_cubes(estimate.theta, estimate.gamma)
+        return self.model.unit_cubes(estimate.theta, estimate.gamma)
+
+    def _found_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
+        holds = found.estimate.status is Status.OK
+        return self.bodies(found.estimate) if holds else np.empty((0, 4, 4))

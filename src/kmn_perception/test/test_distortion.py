@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Header
 
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.distortion import Distortion, rectify
+from kmn_perception.model.distortion import Distortion, rectify, resample
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import (
     MessageError,
@@ -120,3 +120,13 @@ def test_coefficients_beyond_all_bounds_leave_nothing_measured(model: str, size:
     raw = CAMERA.resized(40, 30)
     depth = rectify(np.ones((30, 40), np.float32), Distortion(model, (1e30,) * size, raw), raw)
     assert np.isnan(depth).mean() > 0.9
+
+
+@pytest.mark.parametrize("model", RADIAL)
+def test_grey_values_lie_on_the_rays_of_the_pinhole_camera(model: str) -> None:
+    target = replace(CAMERA, width=200, height=150, fx=200.0, fy=210.0, cx=95.0, cy=80.0)
+    seen = resample(raw_depth(model, PLANE), Distortion(model, RADIAL[model], CAMERA), target)
+    v, u = np.indices((target.height, target.width))
+    expected = 1.0 / (target.rays(u, v) @ PLANE)
+    middle = (slice(20, -20), slice(20, -20))
+    np.testing.assert_allclose(seen[middle], expected[middle], atol=2e-3)

@@ -19,6 +19,7 @@ NONE = np.nan
 HIGH, ON_SUPPORT = 1.0, 0.0  # metres above the support
 BORDER_RUN = 8  # pixels
 WIDE = BORDER_RUN + 1
+SHADOW = 50.0, 3.0  # pixels by 1 / m, and pixels of slack
 CHI_SQUARED = 12.6  # 95 % of six degrees of freedom
 
 
@@ -31,7 +32,7 @@ def row(*runs: tuple[float, float, int]) -> NDArray[np.float32]:
 def free(points: NDArray[np.float32]) -> NDArray[np.float32]:
     to_world = np.eye(4)[[1, 2, 0, 3]]  # the test's heights are in x
     nothing = np.full(points.shape[:2], -1, dtype=np.int32)
-    return free_space(points, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth[0]
+    return free_space(points, nothing, np.eye(4), to_world, 0.01, BORDER_RUN, SHADOW).free_depth[0]
 
 
 def test_pixels_are_empty_up_to_what_they_show_and_wholly_where_they_show_the_support() -> None:
@@ -49,13 +50,26 @@ def test_a_gap_is_empty_up_to_the_farther_one_of_those_beside_it() -> None:
     np.testing.assert_allclose(behind[1:-1], 0.9)
 
 
+@pytest.mark.parametrize("length, known", [(53, 1.0), (54, UNKNOWN)])
+@pytest.mark.parametrize("near, far", [(0.5, 1.0), (1.0, 0.5)])
+def test_a_gap_wider_than_a_shadow_is_unknown(
+    near: float, far: float, length: int, known: float
+) -> None:
+    points = row((near, HIGH, 2), (NONE, HIGH, length), (far, HIGH, 2))
+    np.testing.assert_array_equal(free(points)[2:-2], known)
+
+
 def test_a_gap_within_an_object_is_unknown() -> None:
     points = row((0.7, HIGH, 2), (NONE, HIGH, 3), (0.8, HIGH, 2))
     labels = np.array([[0, 0, -1, -1, -1, 0, 0]], dtype=np.int32)
-    known = free_space(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
+    known = free_space(
+        points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN, SHADOW
+    ).free_depth[0]
     np.testing.assert_allclose(known, [0.7, 0.7, UNKNOWN, UNKNOWN, UNKNOWN, 0.8, 0.8])
     labels[0, -2:] = 1
-    other = free_space(points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN).free_depth[0]
+    other = free_space(
+        points, labels, np.eye(4), np.eye(4), -np.inf, BORDER_RUN, SHADOW
+    ).free_depth[0]
     np.testing.assert_allclose(other[2:5], 0.8)
 
 
@@ -75,7 +89,7 @@ def test_narrow_gaps_at_the_top_and_the_bottom_are_unknown(
     image = np.ascontiguousarray(np.repeat(column[::-1] if upside_down else column, 20, axis=1))
     nothing = np.full(image.shape[:2], -1, dtype=np.int32)
     to_world = np.eye(4)[[1, 2, 0, 3]]
-    seen = free_space(image, nothing, np.eye(4), to_world, 0.01, BORDER_RUN).free_depth
+    seen = free_space(image, nothing, np.eye(4), to_world, 0.01, BORDER_RUN, SHADOW).free_depth
     seen = seen[::-1] if upside_down else seen
     np.testing.assert_array_equal(seen[:length], known)
     np.testing.assert_allclose(seen[length:], 0.7)
@@ -83,7 +97,7 @@ def test_narrow_gaps_at_the_top_and_the_bottom_are_unknown(
 
 def test_what_was_not_measured_is_marked_as_interpolated() -> None:
     points = row((0.7, HIGH, 1), (NONE, HIGH, 2))
-    around = free_space(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0)
+    around = free_space(points, np.zeros((1, 3), np.int32), np.eye(4), np.eye(4), 0.0, 0, SHADOW)
     np.testing.assert_array_equal(around.interpolated, [[False, True, True]])
 
 

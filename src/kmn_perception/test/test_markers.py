@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from std_msgs.msg import Header
 
@@ -17,9 +15,9 @@ BOX = KinematicModel.load("box")
 def drawn(**theta: float) -> list[list[float]]:
     """Return the sizes of the cubes that show a box whose other parameters are 0."""
     values = np.array([theta.get(parameter.name, 0.0) for parameter in BOX.theta])
-    none = Estimate.none(BOX, 0, Status.NOT_CONVERGED, "no fit")
-    estimate = replace(none, theta=values, gamma=np.zeros(len(BOX.gamma)))
-    _, *cubes = markers_from_estimates(BOX, [estimate], Header()).markers
+    estimate = Estimate.none(BOX, 0, Status.NOT_CONVERGED, "no fit")
+    bodies = BOX.unit_cubes(values, np.zeros(len(BOX.gamma)))
+    _, *cubes = markers_from_estimates("box", [(estimate, bodies)], Header()).markers
     return [[cube.scale.x, cube.scale.y, cube.scale.z] for cube in cubes]
 
 

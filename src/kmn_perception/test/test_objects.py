@@ -14,7 +14,7 @@ from kmn_perception.estimator import Status
 from kmn_perception.model.camera import Camera, look_at
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.sensor_noise import add_noise
-from kmn_perception.pipeline import ObjectEstimate
+from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import RealFrame, tabletop_pipeline

@@ -36,7 +36,7 @@ SETTINGS = SegmentationSettings(
     cluster_concave_angle=0.5,
 )
 SCENE = SceneSettings.load()
-CONCAVE_EDGES, RAISED = SCENE.concave_edges, SCENE.raised_plane
+RAISED = SCENE.raised_plane
 OFF = replace(SETTINGS, crop=False, remove_plane=False, cluster=False)
 CAMERA = Camera.load("box").resized(320, 240)
 KINECT_V1 = np.array([[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]])
@@ -57,7 +57,7 @@ def nearest(
     settings: SegmentationSettings = SETTINGS,
 ) -> NDArray[np.float32]:
     """Return the nearest object's points in the world frame."""
-    return segmentation.segment(points, pose, viewpoint, settings, CONCAVE_EDGES).of_object(0)
+    return segmentation.segment(points, pose, viewpoint, settings, SCENE).of_object(0)
 
 
 def segment(

@@ -7,7 +7,7 @@ import pytest
 
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.estimator import Status
-from kmn_perception.experiments.experiment import load_pipeline
+from kmn_perception.experiments.experiment import TABLETOP, load_pipeline
 from kmn_perception.experiments.labelled_frame import read_frames
 from kmn_perception.experiments.reference import measure
 from kmn_perception.experiments.settings import ExperimentSettings
@@ -31,7 +31,7 @@ def slid_up_to(carton: UprightBox, x: float) -> UprightBox:
 
 @pytest.mark.parametrize(("name", "side"), [("learn12", 1), ("learn15", 1), ("learn15", -1)])
 def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, side: int) -> None:
-    pipeline = load_pipeline()
+    pipeline = load_pipeline(TABLETOP)
     model = pipeline.estimator.model
     (frame,) = (f for f in read_frames(share_directory() / "data/kinect_boxes") if f.name == name)
     references = measure(frame, SETTINGS, model.camera.pose)
@@ -59,7 +59,7 @@ def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, sid
 @pytest.mark.parametrize("name", ["learn3", "learn8"])
 def test_two_that_seem_one_are_not_stated_as_one_box(name: str) -> None:
     """A box of nearly the same height stands behind a carton and reaches out by 3 cm beside it."""
-    pipeline = load_pipeline()
+    pipeline = load_pipeline(TABLETOP)
     (frame,) = (f for f in read_frames(share_directory() / "data/kinect_boxes") if f.name == name)
     references = measure(frame, SETTINGS, pipeline.estimator.model.camera.pose)
     long = max((r.box for r in references.boxes), key=lambda box: box.size[:2].max())

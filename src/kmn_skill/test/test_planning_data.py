@@ -23,7 +23,7 @@ from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, pairs
-from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.prototypes import Prototypes, Solution
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.timing import timed_plan
@@ -110,14 +110,18 @@ def test_solutions_are_read_as_they_were_saved(tmp_path: Path) -> None:
     solutions.save(tmp_path / "mine.json")
     found = Prototypes.load(tmp_path / "mine.json")
     assert found.joints == solutions.joints == PlanningSetup.load(DOOR).joint_names
-    for name, path in solutions.paths.items():
-        np.testing.assert_array_equal(found.paths[name], path)
+    assert found.solutions.keys() == solutions.solutions.keys()
+    for name, known in solutions.solutions.items():
+        for one, same in zip(known, found.solutions[name], strict=True):
+            np.testing.assert_array_equal(same.gamma, one.gamma)
+            np.testing.assert_array_equal(same.path, one.path)
 
 
 def test_the_solutions_begin_at_the_robot_s_home() -> None:
     home = RobotModel.load("pr2").home
-    for path in Prototypes.load().paths.values():
-        np.testing.assert_allclose(path[0, layout.ROBOT], home)
+    for known in Prototypes.load().solutions.values():
+        for _, path in known:
+            np.testing.assert_allclose(path[0, layout.ROBOT], home)
 
 
 def remove(*keys: str) -> Callable[[dict[str, Any]], None]:
@@ -182,7 +186,8 @@ def test_a_robot_with_six_axes_has_its_policy_plan_and_check(tmp_path: Path) -> 
     request = PlanRequest(theta, gamma, robot.home, np.zeros(2), -0.7, OPEN_TO)
     solutions = Prototypes.load()
     welded = solutions.joints.index("l_forearm_roll_joint")
-    guess = transfer(np.delete(solutions.paths["pull"], welded, axis=1), DOOR, request)
+    path = np.delete(solutions.solutions["pull"][0].path, welded, axis=1)
+    guess = transfer(Solution(gamma, path), DOOR, request)
     world = World(setup, theta, gamma)
     policy = Policy(world, request, setup.settings.planner.coarse, pairs(world))
     assert policy.problem.nlp().getDimension() == guess.size == 20 * 12

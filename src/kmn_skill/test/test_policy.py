@@ -12,12 +12,13 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
-from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.prototypes import Prototypes, Solution
 from kmn_skill.planning.transfer import hermite, move_base, refine, transfer
 from kmn_skill.planning.world import World
 
 MODEL = KinematicModel.load("door")
-SETUP, SOLUTIONS = PlanningSetup.load(MODEL), Prototypes.load().paths
+SETUP = PlanningSetup.load(MODEL)
+SOLUTIONS = {name: known[0].path for name, known in Prototypes.load().solutions.items()}
 HOME = SETUP.robot.home
 THETA = np.array([0.4, -0.6, 0.8])
 ZERO = np.zeros(3), np.zeros(4)
@@ -63,7 +64,7 @@ def test_moved_with_door_and_start_the_solution_has_the_same_features(mode: str)
     start = np.array([*move_base(HOME[:3], pose), *HOME[3:]])
     moved = request(mode, theta=THETA, start=start)
     before = squared(request(mode), solution[1:])
-    after = squared(moved, transfer(solution, MODEL, moved))
+    after = squared(moved, transfer(Solution(ZERO[1], solution), MODEL, moved))
     for kind, value in before.items():
         assert after[kind] == pytest.approx(value, rel=1e-3, abs=1e-3)
 
@@ -79,7 +80,7 @@ def test_the_base_moves_as_a_pose_does() -> None:
 def test_the_transfer_begins_at_the_start_and_ends_at_the_goal() -> None:
     solution = SOLUTIONS["pull"]
     asked = request("pull", theta=THETA, door_start=np.array([-0.2, -0.1]), door_angle=-0.6)
-    guess = transfer(solution, MODEL, asked)
+    guess = transfer(Solution(ZERO[1], solution), MODEL, asked)
     assert len(guess) == len(solution) - 1
     assert np.abs(guess[0, :11] - asked.start).max() < 0.6  # one step away
     assert guess[0, 11:] == pytest.approx([-0.2, -0.1], abs=1e-6)
@@ -89,7 +90,7 @@ def test_the_transfer_begins_at_the_start_and_ends_at_the_goal() -> None:
 def test_a_handle_at_another_place_moves_the_base_with_it() -> None:
     solution = SOLUTIONS["pull"]
     gamma = np.array([0.0, 0.1, 0.02, 0.05])
-    guess = transfer(solution, MODEL, request("pull", gamma=gamma))
+    guess = transfer(Solution(ZERO[1], solution), MODEL, request("pull", gamma=gamma))
     handle = MODEL.joints[1]
     shift = handle.origin(gamma) - handle.origin(ZERO[1])
     grasp = 2 * (len(guess) // 4)  # the door is closed

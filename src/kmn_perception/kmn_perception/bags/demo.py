@@ -27,7 +27,7 @@ from kmn_perception.estimator import Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points
-from kmn_perception.pipeline import PipelineSettings
+from kmn_perception.pipeline_interface import PipelineSettings
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient
 from kmn_perception.ros.parameters import declare_parameters
@@ -193,9 +193,7 @@ def draw_frames(
         points = depth_to_points(depth, intrinsics)
         plane = find_support_plane(points, settings.plane)
         pose = model.camera.pose if plane is None else pose_above(plane, model.camera.pose)
-        segments = segment(
-            points, pose, pose[:3, 3], settings.background, settings.scene.concave_edges
-        )
+        segments = segment(points, pose, pose[:3, 3], settings.background, settings.scene)
         seen = [ShownObject(segments.of_object(i), NOTHING, True) for i in range(segments.objects)]
         found = [
             ShownObject(segments.points[:0], found.unit_cubes, found.status is Status.OK)

@@ -46,7 +46,7 @@ def chain(
     def callback() -> None:
         estimate = pipeline.estimate(message_to_view())
         parameters_from_estimate(model, estimate, cloud.header)
-        markers_from_estimates(model, [estimate], cloud.header)
+        markers_from_estimates(model.name, [(estimate, pipeline.bodies(estimate))], cloud.header)
 
     view = message_to_view()
     views = pipeline.observe(view, 1)

@@ -20,6 +20,8 @@ class Candidate(NamedTuple):
     ----------
     score
         The larger, the more it looks like a door.
+    lines
+        All upright edges of the view.
     confidence, proposals
         The network's probability of these edges, and what else it proposes; NaN and None without a
         network.
@@ -30,8 +32,13 @@ class Candidate(NamedTuple):
     pieces: Pieces
     left: Line
     right: Line
+    lines: Sequence[Line]
     confidence: float = np.nan
     proposals: Proposals | None = None
+
+    def edge(self, side: str) -> Line:
+        """Return the ``left`` or the ``right`` edge."""
+        return self.left if side == "left" else self.right
 
     @property
     def directions(self) -> tuple[float, float]:
@@ -53,12 +60,12 @@ def find_candidates(
             width = (right.column - left.column) * pixel
             if narrow - slack <= width <= wide + slack:
                 score = score_of(left, right, width, lines, pieces, pixel, settings)
-                found.append(Candidate(score, view, pieces, left, right))
+                found.append(Candidate(score, view, pieces, left, right, lines))
     found.sort(key=lambda candidate: -candidate.score)
-    return _distinct(found, slack / pixel)[: settings.candidates]
+    return distinct(found, slack / pixel)[: settings.candidates]
 
 
-def _distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
+def distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
     """Keep, of pairs whose edges lie within so many pixels, the one with the clearest edges."""
     kept: list[Candidate] = []
     for candidate in candidates:
@@ -76,6 +83,8 @@ def _distinct(candidates: Sequence[Candidate], tie: float) -> list[Candidate]:
 
 
 def _clarity(candidate: Candidate) -> float:
+    if candidate.proposals is not None:
+        return candidate.score
     opposite = candidate.left.sign == -candidate.right.sign
     lines = (candidate.left, candidate.right)
     return sum(min(line.contrast, 1.0) + 0.05 * abs(line.step) for line in lines) * (1 + opposite)

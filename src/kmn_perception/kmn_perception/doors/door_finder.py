@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from kmn_perception.doors.camera_check import doubt_upright
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
-from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.proposals import with_proposals
+from kmn_perception.doors.settings import Calibration, DoorSettings
 from kmn_perception.doors.verdict import judge
+from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.doors.wall_view import WallView
-from kmn_perception.doors.walls import Frame, NoWallError, find_walls
+from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
+from kmn_perception.network import wall_weights
+from kmn_perception.network.wall_network import WallNetwork
 
 
 class DoorFinder:
@@ -21,12 +27,34 @@ class DoorFinder:
 
     Attributes
     ----------
-    settings
-        May be replaced between two frames.
+    settings, network
+        May be replaced between two frames; without a network edges alone propose.
     """
 
-    def __init__(self, settings: DoorSettings, seed: int = 0) -> None:
-        self.settings, self.seed = settings, seed
+    def __init__(
+        self, settings: DoorSettings, network: WallNetwork | None = None, seed: int = 0
+    ) -> None:
+        self.settings, self.network, self.seed = settings, network, seed
+
+    @classmethod
+    def load(cls, weights_file: str | Path = "") -> DoorFinder:
+        """Load the settings and a network; an empty ``weights_file`` means the shipped one.
+
+        Raises
+        ------
+        FileNotFoundError, ConfigurationError
+            If the settings are missing or wrong.
+        WeightsError
+            If the weights are missing, corrupt, or of another network.
+        """
+        settings = DoorSettings.load()
+        weights = wall_weights.load(weights_file or wall_weights.MODEL, describe_cells(settings))
+        return cls(settings, weights.network)
+
+    def with_calibration(self, calibration: Calibration) -> DoorFinder:
+        """Return the finder for a sensor that is calibrated so well."""
+        settings = replace(self.settings, calibration=calibration)
+        return DoorFinder(settings, self.network, self.seed)
 
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""
@@ -35,6 +63,19 @@ class DoorFinder:
             walls = find_walls(frame, settings, np.random.default_rng(self.seed))
         except NoWallError as error:
             return DoorEstimate.none(str(error))
+        best = self._search(frame, walls)
+        if best.handle_side and not walls.floor_seen:
+            # By the handle's usual height the camera is somewhere else above the floor.
+            walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
+            best = self._search(frame, walls)
+        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
+            doubt = doubt_upright(best, walls.planes, walls.up, settings)
+            best = DoorEstimate.none(doubt) if doubt else best
+        return best
+
+    def _search(self, frame: Frame, walls: Walls) -> DoorEstimate:
+        """Return the best door of the walls."""
+        settings = self.settings
         candidates = [candidate for view in walls.views for candidate in self._candidates(view)]
         if not candidates:
             return DoorEstimate.none(_no_edges(frame))
@@ -42,8 +83,8 @@ class DoorFinder:
         found: list[DoorEstimate] = []
         bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
         for candidate in candidates[: settings.candidates]:
-            best = max((door.score for door in found if door.found), default=-np.inf)
-            if candidate.score + bonus < best:
+            bar = max((door.score for door in found if door.found), default=-np.inf)
+            if candidate.score + bonus < bar:
                 break  # neither this nor a later one can be as good
             measurement = measure(frame, walls.blocks, candidate, walls.floor_seen, settings)
             if measurement is not None:
@@ -55,7 +96,11 @@ class DoorFinder:
         settings, noise = self.settings, self.settings.fit.pixel_noise
         before, behind = settings.view.before * noise, settings.view.behind * noise
         pieces = cut_to_pieces(view, before, behind, settings.lines)
-        return find_candidates(view, pieces, find_lines(pieces, settings.lines), settings)
+        lines = find_lines(pieces, settings.lines)
+        candidates = find_candidates(view, pieces, lines, settings)
+        if self.network is None or view.grey is None:
+            return candidates  # it was trained on images, and knows little of depth alone
+        return with_proposals(candidates, view, pieces, lines, self.network, settings)
 
     def _best(self, found: list[DoorEstimate]) -> DoorEstimate:
         """Return the door that most speaks for, unless another one is as likely."""

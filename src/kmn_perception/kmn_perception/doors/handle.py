@@ -21,6 +21,15 @@ _LEVER, _KNOB = 0.145, 0.055  # metres that they measure
 _AMBIGUOUS = 0.04  # metres: lengths that differ by less do not tell a lever from a knob
 
 
+class Hint(NamedTuple):
+    """Where a network sees a handle: its kind, place on the panel (metres) and probability."""
+
+    kind: str
+    s: float
+    z: float
+    probability: float
+
+
 class Handle(NamedTuple):
     """A handle as it is seen on the panel.
 
@@ -29,7 +38,7 @@ class Handle(NamedTuple):
     side
         ``left`` or ``right``, as seen.
     kind
-        ``lever`` or ``knob``.
+        ``lever``, ``knob`` or ``bar``.
     s, z
         Where the ray through its middle meets the panel: metres to the right of the camera along
         the panel, and above the floor.
@@ -37,8 +46,8 @@ class Handle(NamedTuple):
         Of its contrast to that of the panel's background.
     other
         Of its contrast to that at the panel's other edge.
-    along_noise
-        Standard deviation of ``s``, metres.
+    along_noise, up_noise
+        Standard deviations of ``s`` and ``z``, metres.
     """
 
     side: str
@@ -48,6 +57,7 @@ class Handle(NamedTuple):
     ratio: float
     other: float
     along_noise: float
+    up_noise: float
 
 
 def find_handle(
@@ -58,6 +68,7 @@ def find_handle(
     camera: Camera,
     settings: HandleSettings,
     step_noise: float,
+    hint: Hint | None,
 ) -> Handle | None:
     """Find the handle of a panel, or None.
 
@@ -71,14 +82,17 @@ def find_handle(
         (height, width) metres, 0 for none; 0 to 1 or None.
     step_noise
         Standard deviation of means of inverse depths over the size of a handle, 1/m.
+    hint
+        Where a network sees it; None without one.
     """
     left, right = edges
     low, high = settings.heights
     margin = 2.0 * settings.bar[2]
     # What stands out is seen further from the point of the panel that is nearest to the camera.
     shifts = {s: settings.protrusion[0] * s / frame.distance for s in edges}
-    s = np.arange(left - margin + min(shifts[left], 0.0), right + margin + max(0.0, shifts[right]), _PIXEL)
-    z = np.arange(high + margin, low - margin, -_PIXEL)
+    first, last = left + min(shifts[left], 0.0), right + max(shifts[right], 0.0)
+    s = np.arange(first - margin, last + margin, _PIXEL, dtype=np.float64)
+    z = np.arange(high + margin, low - margin, -_PIXEL, dtype=np.float64)
     view = resample(frame, s, z, depth, grey, camera)
     windows = {
         "left": (s > left + shifts[left] - 0.01) & (s < left + shifts[left] + settings.reach),
@@ -87,7 +101,7 @@ def find_handle(
     middle = ~(windows["left"] | windows["right"]) & (s > left) & (s < right)
     level = (z > low) & (z < high)
     if grey is not None:
-        return _in_grey(view, windows, middle, level, edges, shifts, settings)
+        return _in_grey(view, windows, middle, level, edges, shifts, settings, hint)
     return _in_depth(view, windows, level, settings, step_noise)
 
 
@@ -99,10 +113,11 @@ def _in_grey(
     edges: tuple[float, float],
     shifts: dict[float, float],
     settings: HandleSettings,
+    hint: Hint | None,
 ) -> Handle | None:
     assert view.grey is not None
     known = cv2.erode(view.inside.astype(np.uint8), np.ones((15, 5), np.uint8)) > 0
-    answer = np.abs(bar_response(view.grey, settings.bar)) * known
+    answer = np.abs(bar_response(view.grey, settings.bar)) * known * level[:, None]
     background = answer[level][:, middle]
     if not background.size:
         return None
@@ -112,24 +127,44 @@ def _in_grey(
         side: max(noise, 1.48 * float(np.median(answer[level][:, window])) if window.any() else 0.0)
         for side, window in windows.items()
     }
-    peaks = {side: float(answer[level][:, window].max(initial=0.0)) for side, window in windows.items()}
+    trust = settings.alone if hint is None else settings.doubted
+    if hint is not None and hint.probability > settings.min_probability:
+        trust = settings.confirmed
+        near = np.abs(view.s - hint.s) < settings.hint_reach
+        answer = answer * near * (np.abs(view.z - hint.z) < settings.hint_reach)[:, None]
+    peaks = {side: float(answer[:, window].max(initial=0.0)) for side, window in windows.items()}
     side = max(peaks, key=lambda name: peaks[name])
     noise = noises[side]
     other = peaks[side] / max(peaks["right" if side == "left" else "left"], noise)
     ratio = peaks[side] / noise
-    if peaks[side] < settings.min_contrast or ratio < settings.min_ratio or other < settings.min_other:
-        return None
-    masked = np.where(level[:, None] & windows[side], answer, 0.0)
+    if peaks[side] < trust.contrast or ratio < trust.ratio or other < trust.other:
+        return _as_hinted(hint, edges, settings)
+    if hint is not None and trust is settings.confirmed and hint.kind == "bar":
+        return _as_hinted(hint, edges, settings)
+    masked = np.where(windows[side], answer, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
     first, last = _extent(view.grey, int(row), int(column), noise, settings)
     rows = slice(max(row - 4, 0), row + 5)
-    weights = np.maximum(answer[rows, first : last + 1].mean(axis=1) - 0.5 * peaks[side] * 0.5, 0.0)
+    weights = np.maximum(answer[rows, first : last + 1].mean(axis=1) - 0.25 * peaks[side], 0.0)
     z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
     shift = shifts[edges[0] if side == "left" else edges[1]]
     outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
     kind, middle_s, sure = _kind(float(view.s[first]), float(view.s[last]), shift, outward)
-    noise_along = settings.along_noise if sure else max(settings.along_noise, 0.4 * abs(shift))
-    return Handle(side, kind, float(middle_s), z, ratio, other, noise_along)
+    along = settings.along_noise if sure else max(settings.along_noise, 0.4 * abs(shift))
+    return Handle(side, kind, float(middle_s), z, ratio, other, along, settings.up_noise)
+
+
+def _as_hinted(
+    hint: Hint | None, edges: tuple[float, float], settings: HandleSettings
+) -> Handle | None:
+    """Return the handle that the network alone sees, if it is sure of it."""
+    if hint is None or hint.probability < settings.sure:
+        return None
+    side = "left" if abs(hint.s - edges[0]) < abs(hint.s - edges[1]) else "right"
+    along, up = settings.hint_noise
+    if hint.kind == "bar":
+        up = settings.bar_noise
+    return Handle(side, hint.kind, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
 
 
 def _kind(first: float, last: float, shift: float, outward: bool) -> tuple[str, float, bool]:
@@ -218,11 +253,11 @@ def _in_depth(
     peaks = {side: float(bump[:, window].max(initial=0.0)) for side, window in windows.items()}
     side = max(peaks, key=lambda name: peaks[name])
     other = peaks[side] / max(peaks["right" if side == "left" else "left"], 1.0)
-    if peaks[side] < settings.bump or other < settings.min_other:
+    if peaks[side] < settings.bump or other < settings.alone.other:
         return None
     masked = np.where(windows[side], bump, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
-    noise = 2.0 * settings.along_noise
+    along, up = settings.hint_noise
     return Handle(
-        side, "lever", float(view.s[column]), float(view.z[row]), peaks[side], other, noise
+        side, "lever", float(view.s[column]), float(view.z[row]), peaks[side], other, along, up
     )

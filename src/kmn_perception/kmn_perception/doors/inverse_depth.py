@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.doors.settings import PlaneSettings
+from kmn_perception.doors.search_settings import PlaneSettings
 from kmn_perception.model.camera import Camera
 
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.settings import LineSettings
+from kmn_perception.doors.search_settings import LineSettings
 from kmn_perception.doors.wall_view import WallView
 
 CLIP = 1.5  # of gradients; a stronger one is no better an edge
@@ -72,9 +72,7 @@ class Pieces:
     rows: NDArray[np.int64]
 
 
-def cut_to_pieces(
-    view: WallView, before: float, behind: float, settings: LineSettings
-) -> Pieces:
+def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSettings) -> Pieces:
     """Take gradient and depth of a view's columns.
 
     Parameters
@@ -119,7 +117,10 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     gradient, known = pieces.gradient[body], pieces.known[body]
     visible = known.sum(axis=0)
     noise = np.array(
-        [1.48 * np.median(np.abs(g[k])) if k.any() else 1.0 for g, k in zip(gradient, known)]
+        [
+            1.48 * np.median(np.abs(g[k])) if k.any() else 1.0
+            for g, k in zip(gradient, known, strict=True)
+        ]
     )
     least = np.maximum(settings.noise_factor * noise, settings.min_contrast)[:, None]
     found = []
@@ -128,7 +129,7 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
         coverage = ((near > least) & known).sum(axis=0) / np.maximum(visible, 1)
         contrast = np.where(known, np.clip(sign * gradient, -1.0, 1.0), 0.0).sum(axis=0)
         contrast = (contrast / np.maximum(visible, 1)).astype(np.float32)
-        peak = (contrast >= _largest_near(contrast)) & (contrast > 0.6 * settings.min_contrast)
+        peak = (contrast >= largest_near(contrast)) & (contrast > 0.6 * settings.min_contrast)
         peak &= (visible >= settings.min_pieces) & (coverage >= settings.min_coverage)
         found += [
             Line(int(c), sign, float(contrast[c]), float(coverage[c]), float(pieces.step[c]))
@@ -138,12 +139,10 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     return sorted(found)
 
 
-def _steps_without_grey(
-    pieces: Pieces, lines: list[Line], settings: LineSettings
-) -> list[Line]:
+def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSettings) -> list[Line]:
     """Return the steps in depth beside which grey shows no edge."""
     size = np.abs(pieces.step).astype(np.float32)
-    peak = (size >= _largest_near(size, 25)) & (size > settings.min_step)
+    peak = (size >= largest_near(size, 25)) & (size > settings.min_step)
     taken = [line.column for line in lines]
     return [
         Line(int(c), int(-np.sign(pieces.step[c])), 0.0, 0.0, float(pieces.step[c]))
@@ -159,7 +158,8 @@ def gaussian_steps(grey: NDArray[np.float32], smoothing: float) -> NDArray[np.fl
     weights = x * np.exp(-0.5 * (x / smoothing) ** 2)
     weights *= smoothing * np.sqrt(2.0 * np.pi) / (weights * x).sum()
     kernel = weights[None].astype(np.float32)
-    return cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    steps = cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(steps, dtype=np.float32)
 
 
 def _gradient(
@@ -213,6 +213,6 @@ def _sums(
     return total
 
 
-def _largest_near(values: NDArray[np.float32], size: int = 9) -> NDArray[np.float32]:
+def largest_near(values: NDArray[np.float32], size: int = 9) -> NDArray[np.float32]:
     """Return the largest value (less rounding) within a window about each."""
     return cv2.dilate(values[None], np.ones((1, size), np.uint8))[0] - np.float32(1e-6)

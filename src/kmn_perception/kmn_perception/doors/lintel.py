@@ -6,12 +6,16 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from kmn_perception.doors.lines import gaussian_steps
+from kmn_perception.doors.candidates import Candidate
+from kmn_perception.doors.lines import gaussian_steps, largest_near
 from kmn_perception.doors.settings import LintelSettings
+from kmn_perception.doors.view_cells import cell_of, row_of
 from kmn_perception.doors.wall_view import WallView
 
 _PIECE = 0.1  # metres
+_UNLIKELY = 0.02  # what a height that the network finds impossible still counts
 _SMOOTHING = 2.0  # pixels of the view
 _SEEN = 0.45  # of the width that a top must be seen in; a poster is narrower
 
@@ -22,59 +26,100 @@ class Lintel(NamedTuple):
     Attributes
     ----------
     z
-        Height of the edge above the floor, metres; None where no edge was found.
+        Height of the edge above the floor in the view, metres; None where no edge was found.
+    deviation
+        Its standard deviation, metres, other edges that may be the top included.
     seen_to
         Height up to which an edge would have been seen, metres; 0 where depth alone shows none.
     """
 
     z: float | None
+    deviation: float
     seen_to: float
 
 
 def find_lintel(
-    view: WallView,
-    left: int,
-    right: int,
-    heights: tuple[float, float],
-    settings: LintelSettings,
+    candidate: Candidate, heights: tuple[float, float], settings: LintelSettings
 ) -> Lintel:
-    """Find the level edge above a door between two columns of its wall's view.
+    """Find the level edge above a door.
 
     Parameters
     ----------
+    candidate
+        The door's edges; where a network saw them, it also tells which heights are likely.
     heights
         Between which it is sought in the view, metres above the floor.
     """
+    view, left, right = candidate.view, candidate.left.column, candidate.right.column
     inner = slice(left + 6, max(right - 6, left + 7))
     inside = view.inside[:, inner]
     enough = np.flatnonzero(inside.mean(axis=1) > 0.5)
     seen_to = float(view.z[enough[0]]) if len(enough) else 0.0
-    low, high = heights
     if view.grey is None:
-        return Lintel(None, 0.0)
-    if seen_to < low:
-        return Lintel(None, seen_to)
+        return Lintel(None, np.inf, 0.0)
+    low, high = heights
+    contrast, coverage = _rows(view, inner, inside, settings)
+    likely = _likely(candidate)
+    if likely is not None and likely[-1] > 0.5:
+        return Lintel(None, np.inf, seen_to)
+    evidence = np.where((view.z > low) & (view.z < high) & coverage, contrast, 0.0)
+    if likely is not None:
+        evidence = evidence * (likely[:-1] + _UNLIKELY)
+    rows = evidence.astype(np.float32)
+    peaks = np.flatnonzero((rows > 0.0) & (rows >= largest_near(rows)))
+    if seen_to < low or not len(peaks):
+        return Lintel(*_by_network(view, likely, settings), seen_to)
+    best = peaks[rows[peaks].argmax()]
+    weights = rows[peaks].astype(np.float64) ** 2
+    spread = np.average((view.z[peaks] - view.z[best]) ** 2, weights=weights)
+    return Lintel(float(view.z[best]), float(np.hypot(settings.noise, np.sqrt(spread))), seen_to)
+
+
+def _by_network(
+    view: WallView, likely: NDArray[np.float64] | None, settings: LintelSettings
+) -> tuple[float | None, float]:
+    """Return a top that the network alone sees, if it is sure of it, and its deviation."""
+    if likely is None or likely[:-1].max() < settings.sure:
+        return None, np.inf
+    return float(
+        np.average(view.z, weights=likely[:-1] >= 0.9 * likely[:-1].max())
+    ), settings.hint_noise
+
+
+def _likely(candidate: Candidate) -> NDArray[np.float64] | None:
+    """Return what the network thinks of each row of the view as the top; the last: not in view."""
+    if candidate.proposals is None:
+        return None
+    view = candidate.view
+    first, last = (round(cell_of(view, line.column)) for line in (candidate.left, candidate.right))
+    probabilities = candidate.proposals.top_over(max(first, 0), last)
+    cells = np.convolve(probabilities[:-1], np.ones(3), mode="same")  # with its neighbours
+    at = np.clip(np.rint(row_of(view, np.arange(len(view.z)))), 0, len(cells) - 1).astype(np.int64)
+    return np.append(cells[at], probabilities[-1])
+
+
+def _rows(
+    view: WallView, inner: slice, inside: NDArray[np.bool_], settings: LintelSettings
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return each row's step of grey (of either sign), and whether enough of the width shows it."""
+    assert view.grey is not None
     shade = np.where(inside, view.grey[:, inner], np.float32(0.0))
     steps = gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T
     known = cv2.erode(inside.astype(np.uint8), np.ones((13, 1), np.uint8)) > 0
     size = max(1, round(_PIECE / abs(float(view.s[1] - view.s[0]))))
     count = steps.shape[1] // size
-    if count < 3:
-        return Lintel(None, seen_to)
     shape = (len(view.z), count, size)
     number = known[:, : count * size].reshape(shape).sum(axis=2)
     pieces = (steps * known)[:, : count * size].reshape(shape).sum(axis=2) / np.maximum(number, 1)
     told = number > 0.5 * size
-    best: tuple[float, float] | None = None
+    visible = np.maximum(told.sum(axis=1), 1)
+    best: NDArray[np.float64] = np.zeros(len(view.z))
+    enough = np.zeros(len(view.z), dtype=np.bool_)
     for sign in (1.0, -1.0):
         near = cv2.dilate((sign * pieces).astype(np.float32), np.ones((5, 1), np.uint8))
-        visible = np.maximum(told.sum(axis=1), 1)
-        coverage = ((near > settings.min_contrast) & told).sum(axis=1) / visible
-        contrast = (np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0)).sum(axis=1) / visible
-        rows = (view.z > low) & (view.z < high) & (coverage >= settings.min_coverage)
-        rows &= ((near > settings.min_contrast) & told).sum(axis=1) >= _SEEN * count
-        if rows.any():
-            row = int(np.where(rows, contrast, -1.0).argmax())
-            if best is None or contrast[row] > best[0]:
-                best = float(contrast[row]), float(view.z[row])
-    return Lintel(None if best is None else best[1], seen_to)
+        hits = ((near > settings.min_contrast) & told).sum(axis=1)
+        contrast = np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0).sum(axis=1) / visible
+        good = (hits >= settings.min_coverage * visible) & (hits >= _SEEN * count)
+        best = np.where(good, np.maximum(best, contrast), best)
+        enough |= good
+    return best, enough

@@ -15,18 +15,22 @@ from kmn_perception.doors.geometry import (
     door_values,
     propagate,
 )
-from kmn_perception.doors.handle import Handle, find_handle
+from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
 from kmn_perception.doors.lintel import Lintel, find_lintel
+from kmn_perception.doors.proposals import handle_of, near
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
+from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallFrame, WallView
 from kmn_perception.doors.walls import Frame
 
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
+_STEP_NOISE = 0.012  # metres, of an edge that only depth or the network tell
+_UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
 class Measurement(NamedTuple):
@@ -38,6 +42,8 @@ class Measurement(NamedTuple):
         The door, see `door_shape` and `DOOR`.
     inverse_height
         Of the camera above the floor, 1/m.
+    edge_deviations
+        Of the left and right edge along the wall, metres, as the image tells them.
     handle
         None where it is not seen.
     floor_seen
@@ -52,6 +58,7 @@ class Measurement(NamedTuple):
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
     inverse_height: float
+    edge_deviations: tuple[float, float]
     floor_seen: bool
 
 
@@ -61,21 +68,22 @@ def measure(
     """Measure a candidate; None where wall or panel are hardly seen."""
     at = candidate.view.frame
     edges = [_edge(candidate, line, settings) for line in (candidate.left, candidate.right)]
+    spreads = [edge_spread(candidate, side, settings) for side in ("left", "right")]
+    edges = [
+        (direction, float(np.hypot(deviation, spread / at.distance)))
+        for (direction, deviation), spread in zip(edges, spreads, strict=True)
+    ]
     directions = edges[0][0], edges[1][0]
-    surfaces = fit_surfaces(
-        blocks, at, directions, floor, settings.calibration, settings.fit
-    )
+    surfaces = fit_surfaces(blocks, at, directions, floor, settings.calibration, settings.fit)
     if surfaces is None:
         return None
-    lintel = find_lintel(
-        candidate.view, candidate.left.column, candidate.right.column,
-        _lintel_heights(at, directions, surfaces, settings), settings.lintel,
-    )  # fmt: skip
+    heights = _lintel_heights(at, directions, surfaces, settings)
+    lintel = find_lintel(candidate, heights, settings.lintel)
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
     on_panel = tuple(_along(at, panel, surfaces, direction) for direction in directions)
     handle = find_handle(
         panel, (on_panel[0], on_panel[1]), frame.depth, frame.grey, frame.camera,
-        settings.handle, settings.lines.step_noise,
+        settings.handle, settings.lines.step_noise, _hint(candidate, panel),
     )  # fmt: skip
     measured, covariance = _gather(at, panel, surfaces, edges, lintel, handle, floor, settings)
     look = View2d(at.right[2], -at.normal[2])
@@ -86,8 +94,29 @@ def measure(
     )
     shape = door_shape(measured, handle_left, ajar)
     return Measurement(
-        candidate, surfaces, lintel, handle, shape, values, spread, float(measured[4]), floor
+        candidate,
+        surfaces,
+        lintel,
+        handle,
+        shape,
+        values,
+        spread,
+        float(measured[4]),
+        (edges[0][1] * at.distance, edges[1][1] * at.distance),
+        floor,
     )
+
+
+def _hint(candidate: Candidate, panel: WallFrame) -> Hint | None:
+    """Return where on the panel a network sees a handle."""
+    seen = handle_of(candidate)
+    if seen is None:
+        return None
+    at = candidate.view.frame
+    ray = at.points(np.array(seen.s), np.array(seen.z))
+    point = ray * (-panel.distance / float(ray @ panel.normal))
+    z = float(point @ panel.up) + panel.height
+    return Hint(seen.kind, float(point @ panel.right), z, seen.probability)
 
 
 def _lintel_heights(
@@ -120,9 +149,36 @@ def _edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tuple[flo
     distance = view.frame.distance
     noise = settings.fit.edge_noise * float(view.footprint[line.column]) / distance
     if line.contrast == 0.0:
-        return float(view.s[line.column]) / distance, 3.0 * noise + 0.012 / distance
+        return float(view.s[line.column]) / distance, 3.0 * noise + _STEP_NOISE / distance
     position, spread = _subpixel(view, pieces, line, settings)
     return position / distance, float(np.hypot(noise, spread / distance))
+
+
+def edge_spread(candidate: Candidate, side: str, settings: DoorSettings) -> float:
+    """Return how far other lines that may be the edge lie from the one that was taken, metres.
+
+    Frame, panel and what stands beside them have edges side by side. Each counts by the square of
+    its contrast and, with a network, by the probability that it is the door's.
+    """
+    chosen = candidate.edge(side)
+    pixel = float(candidate.view.s[1] - candidate.view.s[0])
+    weights, offsets = [], []
+    for line in candidate.lines:
+        offset = (line.column - chosen.column) * pixel
+        if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
+            weights.append(min(line.contrast, 1.0) ** 2 * _probability(candidate, side, line))
+            offsets.append(offset)
+    if not sum(weights):
+        return 0.0
+    return float(np.sqrt(np.average(np.square(offsets), weights=weights)))
+
+
+def _probability(candidate: Candidate, side: str, line: Line) -> float:
+    """Return the network's probability that a line is the door's edge; 1 without a network."""
+    if candidate.proposals is None:
+        return 1.0
+    found = candidate.proposals.left if side == "left" else candidate.proposals.right
+    return near(found, round(cell_of(candidate.view, line.column)), 1) + _UNLIKELY
 
 
 def _subpixel(
@@ -181,48 +237,44 @@ def _gather(
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         recess.append(depth)
         outward = direction < 0.0 if i == 0 else direction > 0.0
-        if depth < 0.0:
-            told = _PROUD
-        else:
-            told = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
+        told = _PROUD if depth < 0.0 else reveal
         values[7 + i], deviations[7 + i] = told
-    middle = 0.5 * (edges[0][0] + edges[1][0])
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
-    far = 1.0 / float(wall_line @ np.array([middle, 1.0]))
+    if handle is None:
+        # Where to look: at the usual place of the right edge.
+        far = 1.0 / float(panel_line @ np.array([edges[1][0], 1.0]))
+        values[10] = edges[1][0] - settings.prior.handle_inset[0] / far
+        deviations[10] = edges[1][0] - edges[0][0]
+        values[11], deviations[11] = (expected[0] - height) / far, 3.0 * expected[1] / far
+    else:
+        point = panel.points(np.array(handle.s), np.array(handle.z))
+        away = float(-point @ at.normal)
+        values[10], values[11] = float(point @ at.right) / away, float(point @ at.up) / away
+        deviations[10], deviations[11] = handle.along_noise / away, handle.up_noise / away
+    values[12], deviations[12] = settings.handle.protrusion
+    covariance = np.zeros((13, 13))
+    covariance[:5, :5] = surfaces.covariance[:5, :5]
+    if not floor:
+        # The handle's usual height tells the floor's, and no more than that.
+        if handle is not None:
+            away = 1.0 / float(panel_line @ np.array([values[10], 1.0]))
+            height = expected[0] - values[11] * away
+        values[4] = 1.0 / height
+        covariance[4, :] = covariance[:, 4] = 0.0
+        covariance[4, 4] = (expected[1] / height**2) ** 2
+    over = np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0])
+    far = 1.0 / float(wall_line @ over)
     if lintel.z is None:
         top, deviation = _usual_top(lintel, settings)
         values[9], deviations[9] = (top - height) / far, deviation / far
     else:
         values[9] = (lintel.z - at.height) / at.distance
-        deviations[9] = settings.lintel.noise / at.distance
-    covariance = np.zeros((13, 13))
-    covariance[:5, :5] = surfaces.covariance[:5, :5]
-    if handle is None:
-        # Where to look: at the usual place of the right edge.
-        ray = np.array([edges[1][0], 1.0])
-        far = 1.0 / (panel_line @ ray)
-        inset = settings.prior.handle_inset
-        values[10] = edges[1][0] - inset[0] / far
-        deviations[10] = (middle - edges[0][0]) * 2.0
-        values[11], deviations[11] = (expected[0] - height) / far, 3.0 * expected[1] / far
-    else:
-        point = panel.points(np.array(handle.s), np.array(handle.z))
-        away = float(-point @ at.normal)
-        values[10] = float(point @ at.right) / away
-        values[11] = float(point @ at.up) / away
-        deviations[10] = handle.along_noise / away
-        deviations[11] = settings.handle.up_noise / away
-    values[12], deviations[12] = settings.handle.protrusion
+        # Is it the frame's or, of a panel elsewhere, the panel's own?
+        apart = values[9] * (far - 1.0 / float(panel_line @ over)) / far
+        deviations[9] = np.hypot(lintel.deviation / at.distance, apart)
     covariance += np.diag(deviations**2)
-    if not floor:
-        # The handle's usual height tells the floor's, and no more than that.
-        ray = np.array([values[10], 1.0])
-        away = 1.0 / (panel_line @ ray)
-        height = expected[0] - values[11] * away if handle is not None else height
-        values[4] = 1.0 / height
-        covariance[4, :] = covariance[:, 4] = 0.0
-        covariance[4, 4] = (expected[1] / height**2) ** 2
     return values, covariance
 
 

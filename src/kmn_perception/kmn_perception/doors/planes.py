@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
-from kmn_perception.doors.settings import PlaneSettings
+from kmn_perception.doors.search_settings import PlaneSettings
 
 _MIN_VOLUME = 1e-4  # of three rays; flatter ones tell no plane
 _REFITS = 5

@@ -3,56 +3,97 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.candidates import Candidate, score_of
+from kmn_perception.doors.candidates import Candidate, distinct, score_of
 from kmn_perception.doors.lines import Line, Pieces
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.view_cells import cell_of, cells_of, column_of
+from kmn_perception.doors.view_cells import cell_of, cells_of, column_of, height_of
 from kmn_perception.doors.wall_view import WallView
-from kmn_perception.network.wall_network import Proposals, WallNetwork, propose
+from kmn_perception.network.wall_network import KINDS, Proposals, WallNetwork, propose
+
+_BESIDE = 6  # cells beside an edge where what stands out may be seen
 
 
-def propose_candidates(
+def with_proposals(
+    candidates: Sequence[Candidate],
     view: WallView,
     pieces: Pieces,
     lines: Sequence[Line],
     network: WallNetwork,
     settings: DoorSettings,
 ) -> list[Candidate]:
-    """Return the pairs of edges that the network finds likely, the likeliest first."""
+    """Return candidates with the network's opinion of them, and those that it proposes itself."""
     noise = settings.fit.pixel_noise
     proposals = propose(network, cells_of(view, noise, settings.view.before * noise))
+    known = [_judged(candidate, proposals, settings) for candidate in candidates]
     pixel = float(view.s[1] - view.s[0])
     narrow, wide = settings.verdict.width
     slack = settings.lines.tie
-    found: list[Candidate] = []
     for first in _peaks(proposals.left, settings.network.peaks):
         for last in _peaks(proposals.right, settings.network.peaks):
             edges = [_edge(view, pieces, lines, at, settings) for at in (first, last)]
             width = (edges[1].column - edges[0].column) * pixel
-            if not narrow - slack <= width <= wide + slack:
-                continue
-            confidence = near(proposals.left, first) * near(proposals.right, last)
-            if confidence < settings.network.min_confidence:
-                continue
-            score = score_of(edges[0], edges[1], width, lines, pieces, pixel, settings)
-            score += settings.score.network * (1.0 + np.log10(confidence) / 3.0)
-            found.append(
-                Candidate(score, view, pieces, edges[0], edges[1], confidence, proposals)
-            )
-    found.sort(key=lambda candidate: -candidate.score)
-    return found
+            if narrow - slack <= width <= wide + slack:
+                score = score_of(edges[0], edges[1], width, lines, pieces, pixel, settings)
+                candidate = Candidate(score, view, pieces, edges[0], edges[1], lines)
+                known.append(_judged(candidate, proposals, settings))
+    known.sort(key=lambda candidate: -candidate.score)
+    return distinct(known, slack / pixel)[: settings.candidates]
 
 
-def confidence_of(candidate: Candidate, proposals: Proposals) -> float:
-    """Return the network's probability of a candidate's edges."""
+def _judged(candidate: Candidate, proposals: Proposals, settings: DoorSettings) -> Candidate:
     view = candidate.view
-    left = cell_of(view, candidate.left.column)
-    right = cell_of(view, candidate.right.column)
-    return near(proposals.left, round(left)) * near(proposals.right, round(right))
+    left = round(cell_of(view, candidate.left.column))
+    right = round(cell_of(view, candidate.right.column))
+    confidence = near(proposals.left, left) * near(proposals.right, right)
+    least = settings.network.min_confidence
+    opinion = 1.0 - np.log(max(confidence, least)) / np.log(least)
+    score = candidate.score + settings.score.network * float(opinion)
+    return candidate._replace(score=score, confidence=confidence, proposals=proposals)
+
+
+class SeenHandle(NamedTuple):
+    """A handle that the network sees: its kind, and the middle's place in the view, metres."""
+
+    kind: str
+    s: float
+    z: float
+    probability: float
+
+
+def handle_of(candidate: Candidate) -> SeenHandle | None:
+    """Return the likeliest handle between two edges, or near them; None without a network."""
+    if candidate.proposals is None:
+        return None
+    view, cells = candidate.view, candidate.proposals.handle
+    first = max(round(cell_of(view, candidate.left.column)) - _BESIDE, 0)
+    last = round(cell_of(view, candidate.right.column)) + _BESIDE
+    inside = cells[:, :, first : last + 1]
+    total = inside.sum(axis=0)
+    row, column = divmod(int(total.argmax()), total.shape[1])
+    rows = slice(max(row - 2, 0), row + 3)
+    columns = slice(max(column - 3, 0), column + 4)
+    part = inside[:, rows, columns]
+    weights = part.sum(axis=0)
+    at = column_of(view, first + columns.start + np.arange(weights.shape[1]))
+    s = view.s[0] + np.average(at, weights=weights.sum(axis=0)) * (view.s[1] - view.s[0])
+    z = np.average(
+        height_of(view, rows.start + np.arange(len(weights))), weights=weights.sum(axis=1)
+    )
+    kind = KINDS[int(part.sum(axis=(1, 2)).argmax())]
+    return SeenHandle(kind, float(s), float(z), float(part.sum()))
+
+
+def edge_probability(candidate: Candidate, side: str) -> float:
+    """Return the network's probability of a candidate's ``left`` or ``right`` edge; 0 without."""
+    if candidate.proposals is None:
+        return 0.0
+    found = candidate.proposals.left if side == "left" else candidate.proposals.right
+    return near(found, round(cell_of(candidate.view, candidate.edge(side).column)))
 
 
 def near(probabilities: NDArray[np.float32], at: int, reach: int = 2) -> float:

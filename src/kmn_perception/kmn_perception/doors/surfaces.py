@@ -134,18 +134,20 @@ def fit_surfaces(
 
     wall_seen = seen(WALL, near & level & beside, settings.block_noise)
     panel_seen = seen(PANEL, near & inside, settings.block_noise)
-    lines = [_start(surface, settings) for surface in (wall_seen, panel_seen)]
-    if any(line is None for line in lines):
+    wall, panel = (_start(surface, settings) for surface in (wall_seen, panel_seen))
+    if wall is None or panel is None:
         return None
     surfaces = [wall_seen, panel_seen]
     if floor:
         surfaces.append(seen(FLOOR, valid & (axes[:, 2] < 0.0), settings.floor_noise))
-    start = np.concatenate((lines[0], lines[1], [1.0 / frame.height], np.zeros(SIZE - 5)))
+    start = np.concatenate((wall, panel, [1.0 / frame.height], np.zeros(SIZE - 5)))
     values, covariance, counts = _solve(surfaces, start, None, calibration, settings)
     if min(counts[:2]) < settings.min_blocks:
         return None
-    opening = _opening(values, covariance, settings)
-    if opening == 0.0:
+    turn, deviation = _turn(values, covariance, settings)
+    least, deviations = settings.ajar
+    opening = turn if abs(turn) > max(least, deviations * deviation) else 0.0
+    if abs(turn) < settings.agree * deviation:
         closed = settings.closed
         values, covariance, counts = _solve(surfaces, values, closed, calibration, settings)
     unhidden = valid & inside & (offset < settings.reach)
@@ -169,13 +171,13 @@ def angle(line: NDArray[np.float64]) -> float:
     return float(np.arctan2(line[0], line[1]))
 
 
-def _opening(
+def _turn(
     values: NDArray[np.float64], covariance: NDArray[np.float64], settings: FitSettings
-) -> float:
-    turn = angle(values[PANEL]) - angle(values[WALL])
-    deviation = float(np.sqrt(_turn_row(values) @ covariance @ _turn_row(values)))
-    least, deviations = settings.ajar
-    return turn if abs(turn) > max(least, deviations * deviation) else 0.0
+) -> tuple[float, float]:
+    """Return the panel's angle to the wall and its standard deviation, radians."""
+    row = _turn_row(values)
+    deviation = float(np.hypot(np.sqrt(row @ covariance @ row), settings.closed))
+    return angle(values[PANEL]) - angle(values[WALL]), deviation
 
 
 def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -245,13 +247,9 @@ def _solve(
     deviations = np.array([calibration.offset, slope, slope, calibration.bend])
     prior[WARP, WARP] = np.diag(deviations**-2.0)
     prior[FLOOR_OFFSET, FLOOR_OFFSET] = calibration.floor**-2.0
-    known = np.zeros(SIZE)
-    if len(surfaces) < 3:  # without a floor the height stays where it is
-        prior[FLOOR, FLOOR] = _FIRM
-        known[FLOOR] = _FIRM * start[FLOOR]
     counts: list[int] = []
     for _ in range(_ROUNDS):
-        information, right_side, counts = prior.copy(), known.copy(), []
+        information, right_side, counts = prior.copy(), np.zeros(SIZE), []
         for surface in surfaces:
             rows = surface.derivatives(values)
             near = np.abs(rows @ values - surface.inverse) < reach
@@ -259,10 +257,13 @@ def _solve(
             information += rows.T @ rows
             right_side += rows.T @ surface.inverse[near] / surface.noise
             counts.append(int(near.sum()))
+        if len(counts) < 3 or not counts[2]:  # without a floor the height stays where it is
+            information[FLOOR, FLOOR] += _FIRM
+            right_side[FLOOR] += _FIRM * start[FLOOR]
         if closed is not None:
             row = _turn_row(values)
             turn = angle(values[PANEL]) - angle(values[WALL])
             information += np.outer(row, row) / closed**2
             right_side += row * (row @ values - turn) / closed**2
-        values = np.linalg.solve(information, right_side)
-    return values, np.linalg.inv(information), counts
+        values = np.linalg.solve(information, right_side).astype(np.float64)
+    return values, np.linalg.inv(information).astype(np.float64), counts

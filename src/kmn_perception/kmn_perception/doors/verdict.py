@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.geometry import DOOR, HANDLE_INSET
-from kmn_perception.doors.lines import Line
+from kmn_perception.doors.geometry import DOOR, HANDLE_INSET, WIDTH
 from kmn_perception.doors.measuring import Measurement
+from kmn_perception.doors.proposals import edge_probability
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
@@ -19,6 +20,10 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     handle = found.handle if _is_on_panel(found, settings) else None
     if reason:
         status = DoorStatus.NO_DOOR
+    elif doubt := _doubt(found, settings):
+        status, reason = DoorStatus.AMBIGUOUS, doubt
+    elif handle is None and not _is_door_without_handle(found, settings):
+        status, reason = DoorStatus.NO_DOOR, "a flat rectangle without a handle may be anything"
     elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
         reason = "no handle is seen; it is sought " + _where(found)
@@ -27,7 +32,7 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     frame = found.candidate.view.frame
     shape = found.shape
 
-    def place(point: np.ndarray, z: float) -> np.ndarray:
+    def place(point: NDArray[np.float64], z: float) -> NDArray[np.float64]:
         height = 1.0 / found.inverse_height
         return point[0] * frame.right - point[1] * frame.normal + (z - height) * frame.up
 
@@ -41,7 +46,9 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         handle_side="" if handle is None else handle.side,
         handle_kind="" if handle is None else handle.kind,
         camera_pose=_camera_pose(frame, 1.0 / found.inverse_height),
-        corners=np.array([place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]),
+        corners=np.array(
+            [place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]
+        ),
         handle=place(shape.handle, shape.handle_height),
         normal=-panel[0] * frame.right + panel[1] * frame.normal,
         disparity_offset=(
@@ -56,7 +63,7 @@ def _score(found: Measurement, settings: DoorSettings) -> float:
     """Return how much speaks for the candidate, with its handle and top."""
     weight, score = settings.score, found.candidate.score
     if found.handle is not None:
-        score += weight.handle * min(found.handle.ratio / (3.0 * settings.handle.min_ratio), 1.0)
+        score += weight.handle * min(found.handle.ratio / (3.0 * settings.handle.alone.ratio), 1.0)
     if found.lintel.z is not None:
         score += weight.lintel
     elif found.lintel.seen_to > settings.verdict.height[1]:
@@ -67,28 +74,34 @@ def _score(found: Measurement, settings: DoorSettings) -> float:
 def _refusal(found: Measurement, settings: DoorSettings) -> str:
     """Return why the candidate is no door, or nothing."""
     verdict, surfaces = settings.verdict, found.surfaces
-    lines = found.candidate.left, found.candidate.right
-    for line, side in zip(lines, ("left", "right"), strict=True):
-        if not _is_edge(line, settings):
+    by_depth = False
+    for side in ("left", "right"):
+        line = found.candidate.edge(side)
+        probability = edge_probability(found.candidate, side)
+        if line.coverage >= verdict.min_coverage or probability >= verdict.sure:
+            continue
+        if abs(line.step) < verdict.min_step:
             return (
                 f"the {side} edge shows in {100 * line.coverage:.0f} % of its height and a step of "
                 f"{abs(line.step):.1f} standard deviations"
             )
-    if not all(line.coverage >= verdict.min_coverage for line in lines):
-        recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
-        if surfaces.opening == 0.0 and abs(recess) < verdict.min_step * deviation:
-            return (
-                f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
-                f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
-            )
+        by_depth = True
+    recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+    if by_depth and surfaces.opening == 0.0 and abs(recess) < verdict.min_step * deviation:
+        return (
+            f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
+            f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
+        )
     low, high = verdict.width
-    width = 0.8 + found.values[4]
-    if not low <= width <= high:
+    width, slack = WIDTH + found.values[4], 2.0 * np.sqrt(found.covariance[4, 4])
+    if not low - slack <= width <= high + slack:
         return f"the edges are {width:.2f} m apart, doors are {low:g} to {high:g} m wide"
     if surfaces.panel_visible < verdict.min_visible:
         return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
     if surfaces.panel_share < verdict.min_panel:
-        return f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
+        return (
+            f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
+        )
     low, high = verdict.height
     top, slack = found.shape.top, 2.0 * np.sqrt(found.covariance[3, 3])
     if found.lintel.z is not None and not low - slack <= top <= high + slack:
@@ -98,9 +111,28 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     return ""
 
 
-def _is_edge(line: Line, settings: DoorSettings) -> bool:
+def _doubt(found: Measurement, settings: DoorSettings) -> str:
+    """Return which edge is not known well enough, or nothing."""
     verdict = settings.verdict
-    return line.coverage >= verdict.min_coverage or abs(line.step) >= verdict.min_step
+    for side, deviation in zip(("left", "right"), found.edge_deviations, strict=True):
+        if deviation > verdict.max_edge_deviation:
+            return f"several lines may be the {side} edge: it is known to {1e3 * deviation:.0f} mm"
+        probability = edge_probability(found.candidate, side)
+        if found.candidate.proposals is not None and probability < verdict.min_probability:
+            return (
+                f"the {side} edge is a door's with a probability of {probability:.2f} only, "
+                f"expected {verdict.min_probability:g}"
+            )
+    return ""
+
+
+def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
+    """Return whether recess, opening or the network tell a door from a poster or a cupboard."""
+    if found.candidate.confidence >= settings.verdict.min_confidence:
+        return True
+    recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
+    deep = bool(recess > settings.verdict.min_step * deviation)
+    return found.surfaces.opening != 0.0 or deep
 
 
 def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:
@@ -113,11 +145,11 @@ def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:
 
 
 def _where(found: Measurement) -> str:
-    point = found.shape.handle
-    return f"{found.shape.handle_height:.2f} m above the floor at either edge, {point[1]:.1f} m away"
+    height, away = found.shape.handle_height, found.shape.handle[1]
+    return f"{height:.2f} m above the floor at either edge, {away:.1f} m away"
 
 
-def _camera_pose(frame: WallFrame, height: float) -> np.ndarray:
+def _camera_pose(frame: WallFrame, height: float) -> NDArray[np.float64]:
     """Return the optical frame in the world: z up, x where it looks, the floor below it at 0."""
     forward = np.array([0.0, 0.0, 1.0])
     forward = forward - (forward @ frame.up) * frame.up

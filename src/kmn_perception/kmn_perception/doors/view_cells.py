@@ -33,15 +33,18 @@ def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]
     """
     shade = np.zeros_like(view.offset) if view.grey is None else view.grey
     within = cv2.erode(view.inside.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
-    right = _in_cells(gaussian_steps(shade, _SMOOTHING) * within)
-    down = _in_cells(gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T * within)
+    right = _whole(gaussian_steps(shade, _SMOOTHING) * within)
+    down = _whole(gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T * within)
+    columns = right.shape[1] // _WIDE
+    right = _mean_to(right, (right.shape[1], ROWS)).reshape(ROWS, columns, _WIDE)
+    down = _mean_to(down, (columns, len(down))).reshape(ROWS, _HIGH, columns)
     measured = np.isfinite(view.offset)
     offset = np.nan_to_num(view.offset, nan=0.0)
     share = _mean(measured.astype(np.float32))
     scaled = _mean(np.clip(offset / noise, -_OFFSET, _OFFSET)) / np.maximum(share, 1e-3)
     channels = [
-        np.clip(_strongest(right.mean(axis=1), axis=2) / _STEP, -1.0, 1.0),
-        np.clip(_strongest(down.mean(axis=3), axis=1) / _STEP, -1.0, 1.0),
+        np.clip(_strongest(right, axis=2) / _STEP, -1.0, 1.0),
+        np.clip(_strongest(down, axis=1) / _STEP, -1.0, 1.0),
         np.clip(scaled * (share > 0.1) / _OFFSET, -1.0, 1.0),
         2.0 * share - 1.0,
         2.0 * _mean(view.inside.astype(np.float32)) - 1.0,
@@ -60,24 +63,34 @@ def cell_of(view: WallView, column: float) -> float:
     return (column - 0.5 * (_WIDE - 1)) / _WIDE
 
 
+def row_of(view: WallView, row: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the cell's row of rows of the view."""
+    return (row - 0.5 * (_HIGH - 1)) / _HIGH
+
+
 def height_of(view: WallView, row: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the height above the floor of the middle of a cell's row, metres."""
     pixel = float(view.z[0] - view.z[1])
     return float(view.z[0]) - pixel * (row * _HIGH + 0.5 * (_HIGH - 1))
 
 
-def _in_cells(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return values (ROWS, high, N, wide) of each cell; missing rows at the bottom are 0."""
+def _whole(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the values of whole cells; missing rows at the bottom are 0."""
     values = values[: ROWS * _HIGH, : values.shape[1] // _WIDE * _WIDE]
     missing = ROWS * _HIGH - len(values)
-    if missing:
-        values = np.pad(values, ((0, missing), (0, 0)))
-    return values.reshape(ROWS, _HIGH, -1, _WIDE)
+    return np.pad(values, ((0, missing), (0, 0))) if missing else values
 
 
 def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    mean: NDArray[np.float32] = _in_cells(values).mean(axis=(1, 3))
-    return mean
+    """Return the means (ROWS, N) of cells."""
+    values = _whole(values)
+    return _mean_to(values, (values.shape[1] // _WIDE, ROWS))
+
+
+def _mean_to(values: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the means of blocks, as many as a size (columns, rows) has."""
+    means = cv2.resize(np.ascontiguousarray(values), size, interpolation=cv2.INTER_AREA)
+    return np.asarray(means, dtype=np.float32)
 
 
 def _strongest(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.settings import WallViewSettings
+from kmn_perception.doors.search_settings import WallViewSettings
 from kmn_perception.model.camera import Camera
 
 
@@ -38,7 +38,8 @@ class WallFrame:
         level = vector - (vector @ up) * up
         length = float(np.linalg.norm(level))
         normal = -level / length
-        return cls(normal, np.cross(up, normal), up, 1.0 / length, height)
+        right = np.asarray(np.cross(up, normal), dtype=np.float64)
+        return cls(normal, right, up, 1.0 / length, height)
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -102,7 +103,8 @@ def view_wall(
     if len(s) < 2:
         return None
     low, high = settings.heights
-    return resample(frame, s, np.arange(high, low, -settings.pixel), depth, grey, camera)
+    z = np.arange(high, low, -settings.pixel, dtype=np.float64)
+    return resample(frame, s, z, depth, grey, camera)
 
 
 def resample(
@@ -132,10 +134,10 @@ def resample(
     with np.errstate(divide="ignore"):
         offset = 1.0 / seen - 1.0 / plane_depth
     offset[(seen <= 0.0) | ~inside] = np.nan
-    shade = None
+    shade: NDArray[np.float32] | None = None
     if grey is not None:
-        shade = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        shade = np.log(np.maximum(shade, 0.0) + np.float32(DARKEST))
+        seen_grey = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shade = np.log(np.maximum(seen_grey, 0.0) + np.float32(DARKEST)).astype(np.float32)
     # Along a level line: the change of direction with s, in pixels.
     footprint = (frame.distance**2 + s**2) / frame.distance / camera.fx
     return WallView(frame, s, z, shade, offset, inside, footprint)
@@ -145,7 +147,7 @@ def _columns_in_view(
     frame: WallFrame, camera: Camera, settings: WallViewSettings
 ) -> NDArray[np.float64]:
     """Return the columns (metres) of which something is in the image."""
-    s = np.arange(-settings.reach, settings.reach, settings.pixel)
+    s = np.arange(-settings.reach, settings.reach, settings.pixel, dtype=np.float64)
     probes = np.linspace(*settings.heights, 13)
     points = frame.points(*np.broadcast_arrays(s, probes[:, None]))
     depth = points[..., 2]

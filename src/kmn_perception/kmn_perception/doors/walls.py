@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.camera_check import find_contradiction
 from kmn_perception.doors.inverse_depth import Blocks
-from kmn_perception.doors.planes import find_planes
+from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
 from kmn_perception.doors.wall_view import WallFrame, WallView, view_wall
@@ -32,11 +35,16 @@ class Frame(NamedTuple):
         (height, width) 0 to 1, of the same pixels; None without an image.
     camera
         Their pinhole camera; its pose is not used.
+    up, height
+        What is known of the camera: the upward unit vector (3,) in the optical frame, and its
+        height above the floor, metres. What is not given is found in the frame.
     """
 
     depth: NDArray[np.float32]
     grey: NDArray[np.float32] | None
     camera: Camera
+    up: NDArray[np.float64] | None = None
+    height: float | None = None
 
 
 class Walls(NamedTuple):
@@ -50,8 +58,8 @@ class Walls(NamedTuple):
         Of the camera above the floor, metres; a usual one where the floor is not seen.
     floor_seen
         Whether it is.
-    blocks
-        The frame's inverse depths.
+    blocks, planes
+        The frame's inverse depths, and all planes among them.
     views
         Of the largest walls, as far as they are in the image.
     """
@@ -60,7 +68,13 @@ class Walls(NamedTuple):
     height: float
     floor_seen: bool
     blocks: Blocks
+    planes: list[Plane]
     views: list[WallView]
+
+    def at_height(self, height: float, frame: Frame, settings: DoorSettings) -> Walls:
+        """Return the walls as seen from another height above a floor that is not in view."""
+        frames = [replace(view.frame, height=height) for view in self.views]
+        return self._replace(height=height, views=_views(frames, frame, settings))
 
 
 def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Generator) -> Walls:
@@ -69,36 +83,57 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     Raises
     ------
     NoWallError
-        If there is no plane, or none that is upright.
+        If there is no plane, or none that is upright, or if the planes contradict what is given.
     """
     noise = settings.fit.pixel_noise
     blocks = Blocks.of(frame.depth, frame.camera, noise, settings.planes)
     planes = find_planes(blocks, noise, settings.planes, generator)
     if not planes:
         raise NoWallError("no plane is seen")
-    segments = None
-    if frame.grey is not None:
-        segments = line_segments(frame.grey, frame.camera, settings.vertical)
-    up = find_up(planes, segments, settings.vertical)
-    floor = _camera_height(blocks, up, settings)
-    height = settings.prior.handle_height[0] if floor is None else floor
+    up = _up(frame, planes, settings)
+    if frame.up is not None and (wrong := find_contradiction(planes, up, frame.height, settings)):
+        raise NoWallError(wrong)
     walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
     if not walls:
         raise NoWallError("no wall is seen")
-    views = []
-    for wall in walls[:_MAX_WALLS]:
-        at = WallFrame.of(wall.vector, up, height)
-        view = view_wall(at, frame.depth, frame.grey, frame.camera, settings.view)
-        if view is not None:
-            views.append(view)
-    return Walls(up, height, floor is not None, blocks, views)
+    floor = frame.height
+    if floor is None:
+        floor = _camera_height(blocks, up, walls, settings)
+    height = settings.prior.handle_height[0] if floor is None else floor
+    frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
+    views = _views(frames, frame, settings)
+    return Walls(up, height, floor is not None, blocks, planes, views)
 
 
-def _camera_height(blocks: Blocks, up: NDArray[np.float64], settings: DoorSettings) -> float | None:
+def _views(frames: Sequence[WallFrame], frame: Frame, settings: DoorSettings) -> list[WallView]:
+    """Return the views of walls that are in the image."""
+    views = (view_wall(at, frame.depth, frame.grey, frame.camera, settings.view) for at in frames)
+    return [view for view in views if view is not None]
+
+
+def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:
+    """Return the upward vector (3,) as it is given, or as the frame shows it."""
+    if frame.up is not None:
+        return frame.up
+    segments = None
+    if frame.grey is not None:
+        segments = line_segments(frame.grey, frame.camera, settings.vertical)
+    return find_up(planes, segments, settings.vertical)
+
+
+def _camera_height(
+    blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane], settings: DoorSettings
+) -> float | None:
+    """Return the camera's height above the floor, from what lies on no wall."""
     rays, inverse, valid = blocks.flat()
+    level = np.ones_like(valid)
+    for wall in walls:
+        reach = settings.planes.inlier * settings.fit.pixel_noise
+        level &= np.abs(rays @ wall.vector - inverse) > reach
     return find_camera_height(
         rays[valid] @ up,
         inverse[valid],
+        level[valid],
         settings.fit.pixel_noise,
         settings.floor.heights,
         settings.floor.min_blocks,

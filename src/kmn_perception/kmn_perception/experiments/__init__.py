@@ -1,4 +1,5 @@
-"""The experiment on real frames: references from labels, the estimates, and their errors.
+"""The experiments on labelled frames, of boxes and of doors: the estimates and their errors.
 
-Imports the pipeline, ``evaluation``, ``visualization``, and of ``ros`` the node's parameters.
+Imports the pipeline, ``doors``, ``evaluation``, ``visualization``, and the node's parameters of
+``ros``.
 """

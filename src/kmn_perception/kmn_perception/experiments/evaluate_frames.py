@@ -11,7 +11,7 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, output_folder, write_json
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.configuration.section import ConfigurationError
-from kmn_perception.experiments.experiment import FrameResult, load_pipeline, run
+from kmn_perception.experiments.experiment import TABLETOP, FrameResult, load_pipeline, run
 from kmn_perception.experiments.labelled_frame import FrameError, check_frames, read_frames
 from kmn_perception.experiments.pictures import draw
 from kmn_perception.experiments.settings import ExperimentSettings
@@ -64,7 +64,7 @@ def main() -> int:
 
 def _report(options: argparse.Namespace) -> None:
     """Evaluate the frames, print the tables, and write what was asked for."""
-    settings, pipeline = ExperimentSettings.load(), load_pipeline()
+    settings, pipeline = ExperimentSettings.load(), load_pipeline(TABLETOP)
     results = evaluate(options.folder, pipeline, settings)
     summary = statistics(results, settings)
     print(object_table(results), method_table(summary), sep="\n\n")

@@ -25,12 +25,13 @@ from kmn_perception.network import weights
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.threads import use_one_thread
-from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError
 from kmn_perception.scene.depth_view import DepthView
 
-PARAMETER_FILE = "morph_node_tabletop"
+TABLETOP = "morph_node_tabletop"  # file of the node's parameters
 
 
 class FrameResult(NamedTuple):
@@ -67,10 +68,10 @@ class FrameResult(NamedTuple):
     simulated_predictions: list[int]
 
 
-def load_pipeline() -> MorphPipeline:
-    """Return the pipeline that morph_node runs with the tabletop parameters, warmed up."""
+def load_pipeline(*files: str) -> MorphPipeline:
+    """Return the pipeline that morph_node runs with the parameters of files, warmed up."""
     use_one_thread()
-    settings = MorphNodeSettings.check(parameter_values("morph_node", PARAMETER_FILE))
+    settings = MorphNodeSettings.check(parameter_values("morph_node", *files))
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()

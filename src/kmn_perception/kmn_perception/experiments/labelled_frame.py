@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +51,9 @@ def check_frames(frames: Sequence[LabelledFrame], settings: ExperimentSettings) 
     for frame in frames:
         if frame.depth.shape != (camera.height, camera.width):
             raise FrameError(
-                f"{frame.name}: {_size(frame.depth)} pixels, expected the {camera.width} x "
-                f"{camera.height} of the experiment's camera (config/experiments.yaml)"
+                f"{frame.name}: {size_text(frame.depth.shape)} pixels, expected the "
+                f"{camera.width} x {camera.height} of the experiment's camera "
+                "(config/experiments.yaml)"
             )
         table = int(((frame.labels == TABLE) & np.isfinite(frame.depth)).sum())
         if table < settings.min_table:
@@ -71,14 +71,15 @@ def read_frames(folder: Path) -> list[LabelledFrame]:
     FrameError
         If there are none, labels are missing, or a picture is not of the expected kind.
     """
-    files = sorted(folder.glob(f"*{DEPTH_SUFFIX}"), key=_by_number)
+    files = sorted(folder.glob(f"*{DEPTH_SUFFIX}"), key=lambda file: by_number(file.name))
     if not files:
         raise FrameError(f"{folder} holds no file *{DEPTH_SUFFIX}, expected depth images")
     return [_read_frame(file) for file in files]
 
 
-def _by_number(file: Path) -> list[int | str]:
-    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", file.name)]
+def by_number(name: str) -> list[int | str]:
+    """Return the key by which names are sorted with their numbers as numbers."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]
 
 
 def _read_frame(file: Path) -> LabelledFrame:
@@ -90,11 +91,12 @@ def _read_frame(file: Path) -> LabelledFrame:
         raise FrameError(str(error)) from error
     if labels.shape != depth.shape:
         raise FrameError(
-            f"{name}: labels of {_size(labels)} pixels for a depth image of {_size(depth)}; "
-            "expected the same size"
+            f"{name}: labels of {size_text(labels.shape)} pixels for a depth image of "
+            f"{size_text(depth.shape)}; expected the same size"
         )
     return LabelledFrame(name, depth, labels)
 
 
-def _size(image: NDArray[Any]) -> str:
-    return f"{image.shape[1]} x {image.shape[0]}"
+def size_text(shape: Sequence[int]) -> str:
+    """Return the size of an image (height, width, ...) for people."""
+    return f"{shape[1]} x {shape[0]}"

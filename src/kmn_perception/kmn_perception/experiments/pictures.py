@@ -12,7 +12,7 @@ from kmn_perception.estimator import Status
 from kmn_perception.experiments.experiment import FrameResult
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.pipeline import ObjectEstimate
+from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.visualization.overlay import Overlay, ShownObject
 
 

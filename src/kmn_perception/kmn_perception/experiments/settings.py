@@ -63,6 +63,28 @@ class BaselineSettings:
 
 
 @dataclass(frozen=True)
+class DoorExperimentSettings:
+    """The experiment on doors.
+
+    Attributes
+    ----------
+    camera
+        In ``config/cameras``, of frames without a JSON file.
+    wrong_edge, wrong_yaw, wrong_deviations
+        An error above these is a wrong answer: of an edge, metres; of the yaw, degrees; of any
+        quantity, in standard deviations of estimate and label together.
+    opening_deviation
+        Minimum of the standard deviation of a label's opening angle, degrees.
+    """
+
+    camera: str
+    wrong_edge: Positive
+    wrong_yaw: Positive
+    wrong_deviations: Positive
+    opening_deviation: Positive
+
+
+@dataclass(frozen=True)
 class ExperimentSettings:
     """The experiment.
 
@@ -98,6 +120,7 @@ class ExperimentSettings:
     faces: FaceSettings
     contour: ContourSettings
     baselines: BaselineSettings
+    doors: DoorExperimentSettings
 
     @classmethod
     def load(cls) -> ExperimentSettings:

@@ -76,10 +76,10 @@ def _of_method(
         "objects": len(counted),
         "found": len(found),
         "false_found": false_found,
-        "yaw_error_deg": {"median": _quantile(yaw, 50), "p95": _quantile(yaw, 95)},
-        "size_error_m": {"median": _quantile(sizes, 50), "p95": _quantile(sizes, 95)},
-        "centre_error_m": {"median": _quantile([s.errors.centre for s in whole], 50)},
-        "iou": {"median": _quantile([s.overlap for s in whole], 50)},
+        "yaw_error_deg": {"median": quantile(yaw, 50), "p95": quantile(yaw, 95)},
+        "size_error_m": {"median": quantile(sizes, 50), "p95": quantile(sizes, 95)},
+        "centre_error_m": {"median": quantile([s.errors.centre for s in whole], 50)},
+        "iou": {"median": quantile([s.overlap for s in whole], 50)},
         "whole": len(whole),
     }
     stated = [s.covered for s in found if s.covered is not None]
@@ -97,7 +97,7 @@ def _by_side(scores: Sequence[Score], settings: ExperimentSettings) -> Statistic
             long = int(size[1] > size[0])
             for name, axis in zip(errors, (long, 1 - long, 2), strict=True):
                 errors[name] += [float(s.errors.size[axis])] if seen[axis] else []
-    return {name: {"median": _quantile(values, 50)} for name, values in errors.items()}
+    return {name: {"median": quantile(values, 50)} for name, values in errors.items()}
 
 
 def _reference_deviation(scores: Sequence[Score], settings: ExperimentSettings) -> Statistics:
@@ -105,10 +105,11 @@ def _reference_deviation(scores: Sequence[Score], settings: ExperimentSettings) 
     references = [s.reference for s in scores if _counts(s, settings)]
     yaw = [float(np.degrees(r.yaw_deviation)) for r in references]
     sides = [d for r in references for d in r.side_deviations[r.in_view].tolist()]
-    return {"yaw_deg": {"median": _quantile(yaw, 50)}, "side_m": {"median": _quantile(sides, 50)}}
+    return {"yaw_deg": {"median": quantile(yaw, 50)}, "side_m": {"median": quantile(sides, 50)}}
 
 
-def _quantile(values: Sequence[float], percent: float) -> float | None:
+def quantile(values: Sequence[float], percent: float) -> float | None:
+    """Return a percentile, rounded; None of no values."""
     return _round(float(np.percentile(values, percent)), 5) if values else None
 
 
@@ -154,28 +155,29 @@ def method_table(result: Statistics) -> str:
     parts: list[tuple[str, Callable[[Statistics], str]]] = [
         ("found", lambda m: f"{m['found']} of {m['objects']}"),
         ("false", lambda m: str(m["false_found"])),
-        ("yaw [deg]", lambda m: _text(m["yaw_error_deg"]["median"], 1.0, 2)),
-        ("p95", lambda m: _text(m["yaw_error_deg"]["p95"], 1.0, 2)),
-        ("size [mm]", lambda m: _text(m["size_error_m"]["median"], 1e3, 1)),
-        ("p95", lambda m: _text(m["size_error_m"]["p95"], 1e3, 1)),
-        ("centre [mm]", lambda m: _text(m["centre_error_m"]["median"], 1e3, 1)),
-        ("IoU", lambda m: _text(m["iou"]["median"], 1.0, 3)),
-        ("in 95 %", lambda m: _text(m.get("coverage95"), 100.0, 0)),
+        ("yaw [deg]", lambda m: text(m["yaw_error_deg"]["median"], 1.0, 2)),
+        ("p95", lambda m: text(m["yaw_error_deg"]["p95"], 1.0, 2)),
+        ("size [mm]", lambda m: text(m["size_error_m"]["median"], 1e3, 1)),
+        ("p95", lambda m: text(m["size_error_m"]["p95"], 1e3, 1)),
+        ("centre [mm]", lambda m: text(m["centre_error_m"]["median"], 1e3, 1)),
+        ("IoU", lambda m: text(m["iou"]["median"], 1.0, 3)),
+        ("in 95 %", lambda m: text(m.get("coverage95"), 100.0, 0)),
     ]
     rows = [["method", *[name for name, _ in parts]]]
     for name, method in {"this package": result, **result["baselines"]}.items():
-        rows.append([name, *[text(method) for _, text in parts]])
+        rows.append([name, *[cell(method) for _, cell in parts]])
     return columns(rows)
 
 
-def _text(value: float | None, scale: float, digits: int) -> str:
+def text(value: float | None, scale: float, digits: int) -> str:
+    """Return a number for a table."""
     return NONE if value is None else f"{scale * value:.{digits}f}"
 
 
 def details(result: Statistics) -> str:
     """Return in words what the table does not hold."""
     by_side, steps = result["size_error_by_side_m"], result["predictions"]
-    sides = ", ".join(f"{name} {_text(e['median'], 1e3, 1)}" for name, e in by_side.items())
+    sides = ", ".join(f"{name} {text(e['median'], 1e3, 1)}" for name, e in by_side.items())
     own, hidden = result["reference_deviation"], result["less_visible"]
     times = result["milliseconds"]
     return "\n".join(
@@ -186,8 +188,8 @@ def details(result: Statistics) -> str:
             f"Milliseconds of one core a frame: {times['median']:.0f} median, "
             f"{times['max']:.0f} maximum",
             "Predictions of the paper's network until one changes little: "
-            f"{_text(steps['real'], 1.0, 1)}, in simulation {_text(steps['simulated'], 1.0, 1)}",
-            f"Standard deviations of the references: yaw {_text(own['yaw_deg']['median'], 1.0, 2)} "
-            f"deg, a side {_text(own['side_m']['median'], 1e3, 1)} mm",
+            f"{text(steps['real'], 1.0, 1)}, in simulation {text(steps['simulated'], 1.0, 1)}",
+            f"Standard deviations of the references: yaw {text(own['yaw_deg']['median'], 1.0, 2)} "
+            f"deg, a side {text(own['side_m']['median'], 1e3, 1)} mm",
         ]
     )

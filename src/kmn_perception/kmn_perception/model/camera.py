@@ -50,7 +50,8 @@ class Camera:
             If a key is missing, unknown or of a wrong value.
         """
         section = Section.load(resources.find("config/cameras", name_or_path))
-        section.allow(("name", "width", "height", "fx", "fy", "cx", "cy", "near", "far", "pose"))
+        keys = ("name", "width", "height", "fx", "fy", "cx", "cy", "near", "far", "pose")
+        section.allow(keys, optional=("colour_distortion",))
         pose = section.section("pose")
         pose.allow(("position", "look_at"))
         near = section.number("near", 0.0, 1e3)

@@ -20,6 +20,17 @@ OPENING = "opening"  # the nuisance that is the angle of the joint below
 HINGE = "hinge"
 
 
+def has_surroundings(name_or_path: str | Path) -> bool:
+    """Tell whether a model's file describes what stands around the object.
+
+    Raises
+    ------
+    FileNotFoundError, ConfigurationError
+        If there is no such file, or it is no mapping.
+    """
+    return "surroundings" in Section.load(resources.find("config/models", name_or_path))
+
+
 @dataclass(frozen=True, eq=False)
 class RoomModel:
     """A door, the kinds of handles that it may have, and the wall and frame around it.

@@ -13,6 +13,7 @@ from kmn_perception.refinement.covariance import with_covariance
 from kmn_perception.refinement.gauss_newton import Fit, fit
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.settings import RefinementSettings
+from kmn_perception.refinement.support import unsupported
 
 
 class Refinement(NamedTuple):
@@ -99,19 +100,19 @@ def _refined(
         values, covariance = best.values, _uniform_covariance(model)
     else:
         values, covariance = with_covariance(problem, best)
+    doubt = unsupported(problem, values, [body.name for body in model.bodies])
     misfit, before = problem.final_misfit(values), problem.final_misfit(start)
     improved = misfit <= before
     if not improved:
         error = start - values
         spread = covariance + np.diag(problem.pixels_per_unit(values) ** -2.0)
         if error @ np.linalg.solve(spread, error) > problem.settings.agreement**2 * len(error):
-            reason = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
-            return _unrefined(model, start, before, iterations, reason)
+            less = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
+            return _unrefined(model, start, before, iterations, doubt or less)
         values, covariance, misfit = start, covariance + np.outer(error, error), before
-    reason = ""
     if misfit > settings.reject_above:
-        reason = f"the model explains {misfit:.0%} of the observation wrongly"
-    return Refinement(values, covariance, misfit, iterations, improved, reason)
+        doubt = f"the model explains {misfit:.0%} of the observation wrongly"
+    return Refinement(values, covariance, misfit, iterations, improved, doubt)
 
 
 def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit, float]:

@@ -16,6 +16,7 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
+from kmn_perception.refinement.support_settings import SupportSettings
 
 Window = Annotated[float, Field(ge=1.0, le=64.0)]
 Pixels = Annotated[int, Field(ge=100)]
@@ -249,7 +250,7 @@ class RefinementSettings:
         Approximate number of observed pixels from which the object's distance is taken.
     correlated_rows
         Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
-    search, reacquisition, fine, edges, occlusion, misfit, starts, unobservable
+    search, reacquisition, support, fine, edges, occlusion, misfit, starts, unobservable
         Settings of the parts.
     damping
         Information that damps the steps, per squared pixel of movement.
@@ -268,6 +269,7 @@ class RefinementSettings:
     correlated_rows: Count
     search: Annotated[tuple[SearchSettings, ...], Field(min_length=1)]
     reacquisition: ReacquisitionSettings
+    support: SupportSettings
     fine: FineSettings
     edges: EdgeSettings
     occlusion: OcclusionSettings

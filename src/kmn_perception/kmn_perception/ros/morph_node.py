@@ -6,6 +6,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -19,12 +20,11 @@ from visualization_msgs.msg import MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.estimator import Estimate, MorphEstimator, Status
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.network.threads import use_one_thread
-from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.estimator import Estimate, Status
+from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
 from kmn_perception.ros.frame_receiver import Frame, FrameReceiver, read_cloud
 from kmn_perception.ros.frame_statistics import FrameStatistics
+from kmn_perception.ros.image_receiver import ImageReceiver
 from kmn_perception.ros.messages import (
     MessageError,
     markers_from_estimates,
@@ -33,6 +33,7 @@ from kmn_perception.ros.messages import (
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.node_program import run_node
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
+from kmn_perception.ros.pipeline_loading import load_pipeline
 from kmn_perception.ros.reports import (
     REPORT_PERIOD,
     ChangeWarnings,
@@ -57,7 +58,7 @@ class DetectedObject(NamedTuple):
 class FrameEstimates(NamedTuple):
     """The objects of a frame, with what their messages need."""
 
-    model: KinematicModel
+    pipeline: Pipeline
     header: Header
     objects: list[DetectedObject]
 
@@ -65,22 +66,23 @@ class FrameEstimates(NamedTuple):
         """Return the message of each object."""
         return [
             parameters_from_estimate(
-                self.model, found.estimate, self.header, found.number, found.truncated
+                self.pipeline.model, found.estimate, self.header, found.number, found.truncated
             )
             for found in self.objects
         ]
 
     def markers(self) -> MarkerArray:
         """Return the message that shows all objects."""
-        estimates = [found.estimate for found in self.objects]
-        return markers_from_estimates(self.model, estimates, self.header)
+        bodies = self.pipeline.bodies
+        drawn = [(found.estimate, bodies(found.estimate)) for found in self.objects]
+        return markers_from_estimates(self.pipeline.model.name, drawn, self.header)
 
 
 class Active(NamedTuple):
     """What the node works with at present; replaced as a whole when parameters change."""
 
     settings: MorphNodeSettings
-    pipeline: MorphPipeline
+    pipeline: Pipeline
 
 
 class MorphNode(Node):
@@ -99,20 +101,23 @@ class MorphNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("morph_node", **options)
         settings = MorphNodeSettings.check(declare_parameters(self, "morph_node"))
-        self._active = Active(settings, _load(settings))
+        self._active = Active(settings, load_pipeline(settings))
         self._statistics = FrameStatistics()
         scene = settings.pipeline.scene
         self._sensor = SensorWatch(REPORT_PERIOD, DiagnosisSettings.load(), scene.intrinsics)
         self._tracker = ObjectTracker(settings.object_distance, scene.memory)
         self._warnings, self._failures = ThrottledWarnings(self), ChangeWarnings(self)
         self._connect()
+        reliability = ReliabilityPolicy[settings.reliability.upper()]
         self._frames = FrameReceiver(
             self,
-            ReliabilityPolicy[settings.reliability.upper()],
+            reliability,
             lambda: self._active.settings,
             self._statistics,
             self._warnings,
         )
+        self._images = ImageReceiver(self, reliability, self._warnings)
+        self._listen_to_images()
         self.add_on_set_parameters_callback(self._on_parameters)
         # A daemon, so that an interrupt in this very moment does not leave the process waiting.
         self._worker = threading.Thread(target=self._work, name="estimation", daemon=True)
@@ -133,12 +138,18 @@ class MorphNode(Node):
         self.create_service(EstimateMorphing, "estimate_morphing", self._on_estimate)
         report_periodically(self, self._report)
 
+    def _listen_to_images(self) -> None:
+        """Subscribe to images only where they are used: they are large."""
+        settings, pipeline = self._active
+        self._images.listen(settings.use_image and pipeline.uses_image)
+
     def _on_estimate(
         self, request: EstimateMorphing.Request, response: EstimateMorphing.Response
     ) -> EstimateMorphing.Response:
         read = partial(read_cloud, request.points)
         self._statistics.receive(replaced=False)
-        answer = self._answer(Frame(request.points.header, read, time.monotonic()), False)
+        frame = Frame(request.points.header, read, time.monotonic())
+        answer = self._answer(frame, all_objects=False, wait_for_image=False)
         response.parameters = answer.parameters()[0]
         return response
 
@@ -151,30 +162,36 @@ class MorphNode(Node):
                     self._parameters_publisher.publish(parameters)
                 self._model_publisher.publish(answer.markers())
 
-    def _answer(self, frame: Frame, all_objects: bool) -> FrameEstimates:
+    def _answer(
+        self, frame: Frame, all_objects: bool, wait_for_image: bool = True
+    ) -> FrameEstimates:
         """Estimate a frame; whatever is wrong with it becomes the reason of the answer."""
         settings, pipeline = self._active
-        model = pipeline.estimator.model
         header = Header(stamp=frame.header.stamp, frame_id=settings.world_frame)
         try:
             view = frame.read(settings)
             if not view.in_world:
                 for mistake in self._sensor.look(view, self._frames.camera_info):
                     self._warnings.warn(mistake.key, mistake.text)
+            waited = time.monotonic() - frame.received
+            patience = settings.image_delay - waited if wait_for_image else 0.0
+            view, lack = self._images.add_to(view, settings, patience)
             objects = pipeline.estimate_all(view, None if all_objects else 1)
+            objects = [_with_lack(found, lack) for found in objects]
+            self._sensor.keep_error(objects[0].estimate.sensor_error)
         except MessageError as error:
             self._refuse(error.reason, str(error))
-            return FrameEstimates(model, header, [_none(model, str(error))])
+            return FrameEstimates(pipeline, header, [_none(pipeline, str(error))])
         except Exception as error:  # a node never dies of a message
             self._refuse("internal_error", traceback.format_exc())
-            return FrameEstimates(model, header, [_none(model, repr(error))])
+            return FrameEstimates(pipeline, header, [_none(pipeline, repr(error))])
         self._warn_of({found.estimate.status: found.estimate.reason for found in objects})
         latency = time.monotonic() - frame.received
         results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
         self._statistics.use(results, latency)
         numbers = self._number(objects) if all_objects else [0]
         return FrameEstimates(
-            model,
+            pipeline,
             header,
             [
                 DetectedObject(o.estimate, number, o.truncated)
@@ -205,7 +222,8 @@ class MorphNode(Node):
         self._frames.refuse_early_image(REPORT_PERIOD)
         name = self.get_fully_qualified_name()
         frames = self._statistics.report(f"{name}: frames", REPORT_PERIOD)
-        return [frames, self._sensor.report(f"{name}: sensor")]
+        images = self._images.report(f"{name}: image")
+        return [frames, self._sensor.report(f"{name}: sensor"), images]
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
@@ -213,29 +231,25 @@ class MorphNode(Node):
         try:
             settings = MorphNodeSettings.check(read_parameters(self, "morph_node", parameters))
             if (settings.model, settings.weights) != (before.model, before.weights):
-                pipeline = _load(settings)
+                pipeline = load_pipeline(settings)
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
-        loaded = pipeline.estimator
-        estimator = MorphEstimator(
-            loaded.model, loaded.network, settings.estimator, loaded.refinement
-        )
-        self._active = Active(settings, MorphPipeline(estimator, settings.pipeline))
+        self._active = Active(settings, pipeline.configured(settings.pipeline, settings.estimator))
+        self._listen_to_images()
         return SetParametersResult(successful=True)
 
 
-def _none(model: KinematicModel, reason: str) -> DetectedObject:
+def _none(pipeline: Pipeline, reason: str) -> DetectedObject:
     """Return what a frame that cannot be read holds."""
-    return DetectedObject(Estimate.none(model, 0, Status.NO_OBJECT, reason), 0, False)
+    return DetectedObject(Estimate.none(pipeline.model, 0, Status.NO_OBJECT, reason), 0, False)
 
 
-def _load(settings: MorphNodeSettings) -> MorphPipeline:
-    """Load model and weights, ready for the first frame."""
-    use_one_thread()
-    estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
-    pipeline = MorphPipeline(estimator, settings.pipeline)
-    pipeline.warm_up()
-    return pipeline
+def _with_lack(found: ObjectEstimate, lack: str) -> ObjectEstimate:
+    """Add what was lacking to the reason of an estimate that is not OK."""
+    estimate = found.estimate
+    if not lack or estimate.status is Status.OK:
+        return found
+    return found._replace(estimate=replace(estimate, reason=f"{estimate.reason}; {lack}"))
 
 
 def main() -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.rotation import matrix_from_quaternion
-from kmn_perception.pipeline import PipelineSettings
+from kmn_perception.pipeline_interface import CalibrationState, PipelineSettings
 from kmn_perception.ros.parameters import pick
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.segmentation import SegmentationSettings
@@ -39,7 +39,11 @@ class MorphNodeSettings:
     max_range
         Coordinates beyond it are not measurements, metres.
     rectify
-        Rectify depth images whose description has a distortion.
+        Rectify depth and grey images whose description has a distortion.
+    use_image
+        Use the images beside the depth, where the model is found by them too.
+    image_delay
+        By which an image's stamp may differ from that of the depth, seconds.
     estimator, pipeline
         Settings of the two.
     """
@@ -52,6 +56,8 @@ class MorphNodeSettings:
     object_distance: float
     max_range: float
     rectify: bool
+    use_image: bool
+    image_delay: float
     estimator: EstimatorSettings
     pipeline: PipelineSettings
 
@@ -79,6 +85,8 @@ class MorphNodeSettings:
             object_distance=values["object_distance"],
             max_range=values["max_range"],
             rectify=values["rectify"],
+            use_image=values["use_image"],
+            image_delay=values["image_delay"],
             estimator=pick(EstimatorSettings, values),
             pipeline=PipelineSettings(
                 camera_pose=CameraPose(values["camera_pose"]),
@@ -91,6 +99,7 @@ class MorphNodeSettings:
                 ),
                 background=pick(SegmentationSettings, values),
                 scene=scene,
+                calibration=CalibrationState(values["calibration"]),
             ),
         )
 

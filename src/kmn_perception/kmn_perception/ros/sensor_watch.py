@@ -35,6 +35,7 @@ class SensorWatch:
         self._period, self._next = period, 0.0
         self._settings, self._intrinsics = settings, intrinsics
         self._newest: list[Diagnosis] = []
+        self._error = ""
 
     def look(self, view: DepthView, info: CameraInfo | None) -> list[Diagnosis]:
         """Return what is likely to be wrong, or nothing if that was told just before.
@@ -54,9 +55,15 @@ class SensorWatch:
         self._newest = diagnose(view.points, described, self._settings, self._intrinsics)
         return self._newest
 
+    def keep_error(self, text: str) -> None:
+        """Keep what an estimate tells about the sensor's error, or that it tells none."""
+        self._error = text
+
     def report(self, name: str) -> DiagnosticStatus:
         """Return the newest diagnosis under the name of who reports."""
-        newest = self._newest
+        newest = self._newest.copy()
+        if self._error:
+            newest.append(Diagnosis("calibration", self._error))
         message = "; ".join(found.text for found in newest) or "nothing wrong was recognised"
         return make_status(name, bool(newest), message, {found.key: found.text for found in newest})
 

@@ -20,6 +20,7 @@ def free_space(
     to_world: NDArray[np.float64],
     floor: float,
     border_run: int,
+    shadow: tuple[float, float],
 ) -> FreeSpace:
     """Return up to which depth each pixel sees nothing.
 
@@ -27,7 +28,8 @@ def free_space(
     Where nothing was measured, it is the larger one of those beside the gap in the same row: a
     sensor with a projector beside it does not measure in the shadow that something near throws on
     something far, so that the gap may hide the far thing, but not the near one. Of a gap within an
-    object nothing is known. A wide gap up to the image's border, along its row and its column,
+    object nothing is known, nor of one that is wider than such a shadow: something was there that
+    could not be measured. A wide gap up to the image's border, along its row and its column,
     shows nothing in range; of a narrow one nothing is known.
 
     Parameters
@@ -42,9 +44,12 @@ def free_space(
         World height in metres of what belongs to the support.
     border_run
         Pixels at the image's border that a sensor may not measure at all.
+    shadow
+        Width of a shadow in pixels by the difference of inverse depths (1/m) that throws it, which
+        is the focal length times the sensor's baseline, and pixels by which it may be wider.
     """
     rows = to_camera[2].copy(), to_world[2].copy()
-    free = _free_depth(points, labels, *rows, floor, border_run)
+    free = _free_depth(points, labels, *rows, floor, border_run, shadow)
     return FreeSpace(free, np.isnan(points[..., 2]))
 
 
@@ -73,6 +78,7 @@ def _free_depth(
     to_height: NDArray[np.float64],
     floor: float,
     border_run: int,
+    shadow: tuple[float, float],
 ) -> NDArray[np.float32]:
     height, width, _ = points.shape
     free = np.empty((height, width), dtype=np.float32)
@@ -83,8 +89,11 @@ def _free_depth(
             if not np.isfinite(depth):
                 continue
             label = labels[row, column]
-            within = label >= 0 and label == left_label
-            _fill(free[row], last + 1, column, left, depth, within, border_run)
+            hidden = label >= 0 and label == left_label
+            if left != UNKNOWN:
+                widest = shadow[0] * abs(1.0 / left - 1.0 / depth) + shadow[1]
+                hidden = hidden or column - last - 1 > widest
+            _fill(free[row], last + 1, column, left, depth, hidden, border_run)
             on_support = _along(to_height, points[row, column]) <= floor
             free[row, column] = EMPTY if on_support else depth
             last, left, left_label = column, depth, label
@@ -124,11 +133,11 @@ def _fill(
     stop: int,
     left: float,
     right: float,
-    within: bool,
+    hidden: bool,
     border_run: int,
 ) -> None:
     """Fill a gap between two depths, one of which is unknown at the image's border."""
-    if within:
+    if hidden:
         free[start:stop] = UNKNOWN
     elif left != UNKNOWN and right != UNKNOWN:
         free[start:stop] = max(left, right)

@@ -10,7 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.scene.concave_edges import find_concave_edges
-from kmn_perception.scene.settings import ConcaveEdgeSettings
+from kmn_perception.scene.connected_pixels import grow, label_image
+from kmn_perception.scene.settings import SceneSettings
 from kmn_perception.scene.union_find import join, number
 
 INFINITE = np.full(3, np.inf)
@@ -84,7 +85,7 @@ def segment(
     pose: NDArray[np.float64],
     viewpoint: NDArray[np.float64],
     settings: SegmentationSettings,
-    concave_edges: ConcaveEdgeSettings,
+    scene: SceneSettings,
 ) -> Segments:
     """Separate the objects' points from the others.
 
@@ -96,8 +97,8 @@ def segment(
         (4, 4) transformation of the points to the world frame.
     viewpoint
         (3,) where the camera stands in the world frame.
-    concave_edges
-        How these are found in organised points.
+    scene
+        How organised points are told apart.
     """
     corners = (settings.crop_min, settings.crop_max) if settings.crop else (-INFINITE, INFINITE)
     low, high = np.array(corners)
@@ -108,7 +109,8 @@ def segment(
         return Segments(world, kept.astype(np.int32) - 1, int(kept.any()))
     eye = np.ascontiguousarray(viewpoint)  # compiled once, whatever it is a part of
     if points.ndim == 3:
-        labels = _part_image(world.reshape(points.shape), kept, eye, settings, concave_edges)
+        image = world.reshape(points.shape)
+        labels = _part_image(image, kept, eye, settings, scene)
     else:
         labels = _label_cloud(world, kept, settings.cluster_step)
     return Segments(world, *_sort(world, labels, eye, settings.cluster_min_points))
@@ -119,18 +121,19 @@ def _part_image(
     kept: NDArray[np.bool_],
     viewpoint: NDArray[np.float64],
     settings: SegmentationSettings,
-    scale: ConcaveEdgeSettings,
+    scene: SceneSettings,
 ) -> NDArray[np.int32]:
     """Label organised points by what is connected without a step and without a concave edge."""
-    labels = _label_image(points, kept, settings.cluster_step)
+    labels = label_image(points, kept, settings.cluster_step, scene.max_gap)
     if settings.cluster_concave_angle == 0.0:
         return labels
-    angle = settings.cluster_concave_angle
+    angle, scale = settings.cluster_concave_angle, scene.concave_edges
     concave_edges = find_concave_edges(points, labels, viewpoint, angle, scale.leg, scale.reach)
     if not concave_edges.any():
         return labels
-    parts = _label_image(points, kept & ~concave_edges, settings.cluster_step)
-    return _grow(points, parts, kept, settings.cluster_step, settings.cluster_min_points)
+    parts = label_image(points, kept & ~concave_edges, settings.cluster_step, scene.max_gap)
+    min_points = settings.cluster_min_points
+    return grow(points, parts, kept, settings.cluster_step, min_points, scene.max_gap)
 
 
 @njit(cache=True)
@@ -152,28 +155,6 @@ def _crop(
             inside = inside and low[axis] <= value <= high[axis]
         kept[i] = inside
     return world, kept
-
-
-@njit(cache=True)
-def _label_image(
-    points: NDArray[np.float32], kept: NDArray[np.bool_], step: float
-) -> NDArray[np.int32]:
-    """Label the connected components of an organised cloud's kept points (height * width,).
-
-    Pixels beside each other are connected if their points are no further apart than ``step``:
-    objects that touch are still told apart where the camera sees a step between them.
-    """
-    height, width, _ = points.shape
-    flat = points.reshape(-1, 3)
-    parents = np.arange(height * width, dtype=np.int32)
-    for row in range(height):
-        for i in range(row * width, (row + 1) * width):
-            if kept[i]:
-                if i > row * width and kept[i - 1] and _near(flat, i, i - 1, step):
-                    join(parents, i, i - 1)
-                if row > 0 and kept[i - width] and _near(flat, i, i - width, step):
-                    join(parents, i, i - width)
-    return number(parents, kept)
 
 
 def _label_cloud(
@@ -198,42 +179,6 @@ def _label_voxels(keys: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArra
             if j < len(keys) and keys[j] == keys[i] + offset:
                 join(parents, i, j)
     return number(parents, np.ones(len(keys), dtype=np.bool_))
-
-
-@njit(cache=True)
-def _grow(
-    points: NDArray[np.float32],
-    labels: NDArray[np.int32],
-    kept: NDArray[np.bool_],
-    step: float,
-    min_points: int,
-) -> NDArray[np.int32]:
-    """Give kept pixels that belong to no large part to the part from which fewest steps lead."""
-    width, flat = points.shape[1], points.reshape(-1, 3)
-    counts = np.zeros(labels.max() + 2, dtype=np.int64)
-    for label in labels:
-        counts[label] += 1
-    grown = np.full_like(labels, -1)
-    queue = np.empty(len(labels), dtype=np.int32)
-    last = 0
-    for i in range(len(labels)):
-        if labels[i] >= 0 and counts[labels[i]] >= min_points:
-            grown[i], queue[last] = labels[i], i
-            last += 1
-    first = 0
-    while first < last:
-        i = queue[first]
-        first += 1
-        column = i % width
-        for k in range(4):
-            j = i + (1, -1, width, -width)[k]
-            outside = j < 0 or j >= len(labels) or (k == 0 and column == width - 1)
-            if outside or (k == 1 and column == 0) or not kept[j] or grown[j] >= 0:
-                continue
-            if _near(flat, i, j, step):
-                grown[j], queue[last] = grown[i], j
-                last += 1
-    return grown
 
 
 @njit(cache=True)
@@ -276,12 +221,3 @@ def _select(points: NDArray[np.float32], kept: NDArray[np.bool_]) -> NDArray[np.
                 selected[count, axis] = points[i, axis]
             count += 1
     return selected
-
-
-@njit(cache=True)
-def _near(points: NDArray[np.float32], i: int, j: int, step: float) -> bool:
-    """Tell whether two points are no further apart than ``step``."""
-    x = points[i, 0] - points[j, 0]
-    y = points[i, 1] - points[j, 1]
-    z = points[i, 2] - points[j, 2]
-    return x * x + y * y + z * z <= step * step

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.settings import Count, Fraction, NonNegative, load_settings
@@ -96,6 +98,21 @@ class RaisedPlaneSettings:
     margin: Fraction
 
 
+class ShadowSettings(NamedTuple):
+    """Where a sensor cannot measure beside something near.
+
+    Attributes
+    ----------
+    baseline
+        Distance of its two viewpoints, metres; at least that of any sensor in use.
+    slack
+        Pixels by which the gap may be wider.
+    """
+
+    baseline: NonNegative
+    slack: NonNegative
+
+
 @dataclass(frozen=True)
 class SceneSettings:
     """All of the file.
@@ -104,11 +121,15 @@ class SceneSettings:
     ----------
     border_run
         Pixels at the image's border that a sensor may not measure at all.
+    max_gap
+        Pixels without a measurement that do not part an object.
     memory
         Frames for which an object that is not seen keeps its number.
     """
 
     border_run: Count
+    max_gap: Annotated[int, Field(ge=0)]
+    shadow: ShadowSettings
     memory: Count
     raised_plane: RaisedPlaneSettings
     concave_edges: ConcaveEdgeSettings

@@ -98,7 +98,9 @@ def train(options: argparse.Namespace) -> None:
 
 def _data_depend_on(doors: DoorSettings) -> dict[str, Any]:
     """Return the settings of others on which the samples depend: a run goes on with the same."""
-    parts = {name: getattr(doors, name) for name in ("planes", "vertical", "floor", "view", "prior")}
+    parts = {
+        name: getattr(doors, name) for name in ("planes", "vertical", "floor", "view", "prior")
+    }
     return {"doors": {name: _plain(part) for name, part in parts.items()},
             "rooms": _plain(RoomSettings.load())}  # fmt: skip
 

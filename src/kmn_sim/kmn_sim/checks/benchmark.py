@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from std_msgs.msg import Header
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
@@ -18,6 +19,7 @@ from kmn_sim.checks.check_perception import whole_scenes
 from kmn_sim.checks.scene_client import scene_client
 from kmn_sim.checks.settings import BenchmarkSettings, PerceptionCheckSettings, TouchPoint
 from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.ros.messages import ENCODINGS, image_from_colour
 from kmn_sim.sensors.depth_camera import DepthCamera
 from kmn_sim.world.renderer import RENDERERS
 from kmn_sim.world.scenario import Scenario
@@ -80,7 +82,7 @@ def benchmark(scenes: int) -> dict[str, Any]:
     settings, check_settings = BenchmarkSettings.load(), PerceptionCheckSettings.load()
     model, world = KinematicModel.load(settings.model), WorldSettings.load()
     scenario, camera = Scenario(model, model.prototype), DepthCamera(model.camera)
-    factors, depth_ms = {}, {}
+    factors, depth_ms, image_ms = {}, {}, {}
     for wanted in RENDERERS:
         simulation = Simulation(scenario, world, renderer=wanted)
         name = simulation.renderer.name
@@ -88,16 +90,23 @@ def benchmark(scenes: int) -> dict[str, Any]:
             lambda: camera.capture(simulation),  # noqa: B023
             settings.frames,
         )
+        colour = camera.expose(simulation).colour
+        for encoding in ENCODINGS:
+            image_ms[f"{name}_{encoding}"] = milliseconds(
+                lambda: image_from_colour(colour, encoding, Header()),  # noqa: B023
+                settings.frames,
+            )
         if wanted == RENDERERS[0]:
             factors["physics"] = real_time_factor(simulation, None, settings)
             factors["with_camera"] = real_time_factor(simulation, camera, settings)
         simulation.close()
     drawn = whole_scenes(model, 0, scenes, check_settings.margin)
-    with scene_client(model, settings.model, "none", 0, check_settings) as client:
+    with scene_client(model, settings.model, {}, check_settings) as client:
         latencies = [1e3 * client.show(values).latency for values in drawn]
     return {
         "real_time_factor": factors,
         "depth_ms": depth_ms,
+        "image_ms": image_ms,  # in addition: the colours are rendered with the depth
         "end_to_end_ms": {
             "median": float(np.median(latencies)),
             "p95": float(np.percentile(latencies, 95.0)),

@@ -15,7 +15,7 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.configuration import resources
 from kmn_perception.estimator import Status
-from kmn_perception.experiments.experiment import load_pipeline
+from kmn_perception.experiments.experiment import TABLETOP, load_pipeline
 from kmn_perception.experiments.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.depth_sensor import DepthSensor
@@ -49,7 +49,7 @@ def twins(
 ) -> Iterator[Twins]:
     """Yield real frames with their simulated twins; frames without an estimate are left out."""
     sensor, camera = DepthSensor.load(settings.camera), Camera.load(settings.camera)
-    pipeline = load_pipeline()
+    pipeline = load_pipeline(TABLETOP)
     for number, frame in enumerate(frames):
         real = Frame(frame.depth, frame.labels == TABLE, frame.labels == frame.objects[0])
         scene = scene_of(real, camera, pipeline)

@@ -26,6 +26,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--scenes", type=whole_number(1), default=20, help="default 20")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of scenes and noise")
     parser.add_argument("--noise", choices=("none", *SENSORS), default="none", help="default none")
+    parser.add_argument("--room", action="store_true", help="the door stands in a room")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     return parser.parse_args(argv)
 
@@ -65,10 +66,12 @@ def check(options: argparse.Namespace) -> dict[str, Any]:
     names = [parameter.name for parameter in model.parameters]
     drawn = whole_scenes(model, options.seed, options.scenes, settings.margin)
     scenes = []
-    with scene_client(model, options.model, options.noise, options.seed, settings) as client:
+    sim = {"noise": options.noise, "seed": options.seed, "room": options.room}
+    with scene_client(model, options.model, sim, settings) as client:
         print(columns([["scene", *names, "status", "ms"]]), flush=True)
         for number, values in enumerate(drawn):
-            answer = client.show(values)
+            room = {"seed": options.seed + number} if options.room else {}
+            answer = client.show(values, **room)
             error = errors(model, answer)
             texts = [f"{number:5d}", *(f"{e:.4f}" for e in error)]
             texts += [answer.reason or "OK", f"{1e3 * answer.latency:.0f}"]
@@ -89,6 +92,7 @@ def check(options: argparse.Namespace) -> dict[str, Any]:
         "parameters": names,
         "seed": options.seed,
         "noise": options.noise,
+        "room": options.room,
         "tolerance": settings.tolerance,
         "within": sum(scene["within"] for scene in scenes),
         "scenes": scenes,

@@ -73,15 +73,21 @@ class SceneClient:
             "morph_node",
         )
 
-    def show(self, values: NDArray[np.float64]) -> SceneEstimate:
+    def show(self, values: NDArray[np.float64], **changes: Any) -> SceneEstimate:
         """Set a scene of morphing parameters (n + m,) and return the estimate of it.
+
+        Parameters
+        ----------
+        changes
+            Of other parameters of sim_node.
 
         Raises
         ------
         ProcessError
             If a node has ended, or there is no answer.
         """
-        scene = {"placement": "given", "values": [float(value) for value in values]}
+        scene: dict[str, Any] = {"placement": "given", "values": [float(value) for value in values]}
+        scene |= changes
         self._client.set_parameters(self._setting, scene, self._timeout)
         self._truths.clear()
         self._estimates.clear()
@@ -108,7 +114,7 @@ class SceneClient:
 
 @contextmanager
 def scene_client(
-    model: KinematicModel, name: str, noise: str, seed: int, settings: PerceptionCheckSettings
+    model: KinematicModel, name: str, parameters: dict[str, Any], settings: PerceptionCheckSettings
 ) -> Iterator[SceneClient]:
     """Start both nodes in a namespace of their own, for the scenes of a model.
 
@@ -116,8 +122,8 @@ def scene_client(
     ----------
     name
         The model's name or file.
-    noise, seed
-        Of the simulated sensor.
+    parameters
+        Of sim_node, beside model, placement and rate.
     settings
         Of the camera's rate, and how long to wait.
     """
@@ -127,7 +133,7 @@ def scene_client(
         "placement": "given",
         "values": [0.0] * len(model.parameters),
     }
-    sim |= {"noise": noise, "seed": seed, "camera_rate": settings.camera_rate}
+    sim |= {**parameters, "camera_rate": settings.camera_rate}
     morph = {"model": name, "reliability": "reliable"}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

@@ -9,11 +9,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from kmn_perception.command_line.arguments import output_file
+from kmn_perception.command_line.arguments import output_file, whole_number
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.sensors.settings import RecordingSettings
 from kmn_sim.sensors.snapshot import snapshot
-from kmn_sim.world.scenario import DIRECTIONS, Scenario
+from kmn_sim.world.scenario import DIRECTIONS, Scenario, in_room
 from kmn_sim.world.settings import WorldSettings
 from kmn_sim.world.simulation import Simulation
 
@@ -27,9 +27,10 @@ def arguments() -> argparse.Namespace:
             f"--{name}", type=float, nargs="*", help="parameters; the prototype's if not given"
         )
     parser.add_argument("--direction", choices=DIRECTIONS, default="pull")
-    for option in ("frame", "wall", "table"):
+    for option in ("frame", "wall", "table", "room"):
         parser.add_argument(f"--{option}", action="store_true")
     parser.add_argument("--out", type=output_file, default=Path("simulation.png"))
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of the room")
     return parser.parse_args()
 
 
@@ -40,7 +41,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
         np.zeros(len(parameters)) if given is None else np.array(given)
         for given, parameters in ((options.theta, model.theta), (options.gamma, model.gamma))
     ]
-    return Scenario(
+    scenario = Scenario(
         model,
         np.concatenate(parts),
         options.direction,
@@ -48,6 +49,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
         wall=options.wall,
         table=options.table,
     )
+    return in_room(scenario, options.seed) if options.room else scenario
 
 
 def main() -> int:
@@ -55,7 +57,7 @@ def main() -> int:
     options = arguments()
     try:
         settings = RecordingSettings.load()
-        simulation = Simulation(scenario_of(options), WorldSettings.load())
+        simulation = Simulation(scenario_of(options), WorldSettings.load(), renderer="software")
         simulation.run(settings.settling)
         picture = snapshot(simulation, settings, settings.snapshot)
         simulation.close()

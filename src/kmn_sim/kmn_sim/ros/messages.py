@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterable, Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
@@ -14,6 +16,8 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.stamps import seconds
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.world.scenario import Scenario
+
+ENCODINGS = ("rgb8", "mono8")  # of images
 
 
 def command_from_message(
@@ -76,3 +80,13 @@ def ground_truth(
         residual=0.0,
         status=MorphingParameters.OK,
     )
+
+
+def image_from_colour(colour: NDArray[np.uint8], encoding: str, header: Header) -> Image:
+    """Make an image of colours (height, width, 3), RGB; ``rgb8`` or ``mono8``."""
+    pixels = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY) if encoding == "mono8" else colour
+    height, width = colour.shape[:2]
+    message = Image(header=header, height=height, width=width, encoding=encoding)
+    message.step = pixels.nbytes // height
+    message.data = array("B", pixels.tobytes())
+    return message

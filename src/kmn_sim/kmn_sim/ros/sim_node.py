@@ -109,6 +109,7 @@ class SimNode(Node):
         self._image_publisher = self.create_publisher(Image, "depth/image", QUEUE_DEPTH)
         self._info_publisher = self.create_publisher(CameraInfo, "depth/camera_info", QUEUE_DEPTH)
         self._points_publisher = self.create_publisher(PointCloud2, "points", QUEUE_DEPTH)
+        self._colour_publisher = self.create_publisher(Image, "image", QUEUE_DEPTH)
 
     def _make_simulation(self) -> Simulation:
         settings = self._settings
@@ -163,9 +164,15 @@ class SimNode(Node):
             self._info_publisher.publish(info_from_camera(camera, header))
         image = self._image_publisher.get_subscription_count()
         points = self._points_publisher.get_subscription_count()
-        if not (image or points):
+        colour = settings["image"] and self._colour_publisher.get_subscription_count()
+        if not (image or points or colour):
             return
-        depth = self._depth_camera.capture(simulation)
+        picture = self._depth_camera.expose(simulation)
+        depth = picture.depth
+        if colour:
+            self._colour_publisher.publish(
+                messages.image_from_colour(picture.colour, settings["image_encoding"], header)
+            )
         if image:
             self._image_publisher.publish(
                 image_from_depth(depth, settings["depth_encoding"], header)

@@ -13,10 +13,10 @@ from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.sensors.recording import FORMATS
-from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.scenario import Scenario, in_room
 
 OPTIONS = ("stem", "frame", "wall", "floor", "table")
-WORLD = ("model", "placement", "values", "seed", "direction", *OPTIONS)
+WORLD = ("model", "placement", "values", "seed", "direction", "room", "recess", *OPTIONS)
 SENSOR = ("model", "camera", "camera_mount", "noise", "seed")
 RECORDING = ("record", "record_rate")
 
@@ -77,4 +77,8 @@ def _scenario(model: KinematicModel, values: Mapping[str, Any]) -> Scenario:
     else:
         placed = np.zeros(len(model.parameters))
     options = {name: values[name] for name in OPTIONS}
-    return Scenario(model, placed, values["direction"], **options)
+    scenario = Scenario(model, placed, values["direction"], **options)
+    if not values["room"]:
+        return scenario
+    recess = values["recess"] if values["recess"] >= 0.0 else None
+    return in_room(scenario, values["seed"], recess)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.noisy_sensor import NoisySensor
+from kmn_sim.world.renderer import Picture
 from kmn_sim.world.simulation import Simulation
 
 
@@ -38,5 +39,11 @@ class DepthCamera:
 
     def capture(self, simulation: Simulation) -> NDArray[np.float32]:
         """Return the depth image (height, width) at present, metres, NaN for none."""
-        exact = simulation.renderer.render(self.camera(simulation)).depth
-        return exact if self._sensor is None else self._sensor.measure(exact, self._camera.fx)
+        return self.expose(simulation).depth
+
+    def expose(self, simulation: Simulation) -> Picture:
+        """Return the depth image at present, as measured, and the colours of the same pixels."""
+        picture = simulation.renderer.render(self.camera(simulation))
+        if self._sensor is None:
+            return picture
+        return picture._replace(depth=self._sensor.measure(picture.depth, self._camera.fx))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from kmn_sim.world.cuboid import Colour, Cuboid, Portal, cuboid
 from kmn_sim.world.scenario import Scenario
 from kmn_sim.world.settings import DoorMechanics, FloorSettings, TableSettings
 
@@ -16,50 +14,50 @@ FRAME, WALL, FLOOR = (0.45, 0.33, 0.24, 1.0), (0.86, 0.86, 0.83, 1.0), (0.55, 0.
 TABLE, CARTON = (0.6, 0.52, 0.42, 1.0), (0.72, 0.55, 0.36, 1.0)
 
 
-class Cuboid(NamedTuple):
-    """An axis-parallel cuboid in the frame of its link: centre and size (3,) in m, colour RGBA."""
-
-    centre: NDArray[np.float64]
-    size: NDArray[np.float64]
-    colour: tuple[float, ...]
-
-    def unit_cube(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the map (4, 4) of the unit cube to the world, where the link has a pose (4, 4)."""
-        cube = np.eye(4)
-        cube[:3, :3], cube[:3, 3] = np.diag(self.size), self.centre
-        return pose @ cube
-
-
 def door_cuboids(scenario: Scenario, settings: DoorMechanics) -> dict[str, list[Cuboid]]:
     """Return the cuboids of a door's links in the object frame: of the bodies, and of ``world``.
 
     The stem belongs to the body that turns about its axis, the handle.
     """
     gamma = scenario.gamma
-    colours = {"panel": PANEL, "handle": HANDLE}
+    colours: dict[str, Colour] = {"panel": PANEL, "handle": HANDLE}
+    if scenario.room is not None:
+        colours["panel"] = scenario.room.colours["panel"]
     links = {
-        body.name: [_cuboid(body.centre(gamma), body.size(gamma), colours.get(body.name, PANEL))]
+        body.name: [cuboid(body.centre(gamma), body.size(gamma), colours.get(body.name, PANEL))]
         for body in scenario.model.bodies
     }
     panel = links["panel"][0]
     stem = scenario.model.stem
     if scenario.stem and stem is not None:
-        links[stem.body.name].append(_cuboid(*stem.cuboid(gamma), HANDLE))
-    links["world"] = []
-    frame, wall = settings.frame, settings.wall
-    if scenario.frame:
-        links["world"] += _portal(panel, frame.gap, frame.thickness, frame.thickness, FRAME)
-    if scenario.wall:
-        inset = frame.gap + (frame.thickness if scenario.frame else 0.0)
-        above = wall.height - panel.size[2] - inset
-        links["world"] += _portal(panel, inset, wall.width, wall.thickness, WALL, above)
+        links[stem.body.name].append(cuboid(*stem.cuboid(gamma), HANDLE))
+    links["world"] = _surroundings(scenario, panel, settings)
     return links
 
 
-def floor_cuboid(top: float, settings: FloorSettings) -> Cuboid:
+def _surroundings(scenario: Scenario, panel: Cuboid, settings: DoorMechanics) -> list[Cuboid]:
+    """Return what stands around a door: its room, or frame and wall alone."""
+    hinge = scenario.model.joints[0]
+    if scenario.room is not None:
+        side = float(np.sign(hinge.origin(scenario.gamma)[1] - panel.centre[1]))
+        return scenario.room.cuboids(panel, side, -1.0 if scenario.direction == "pull" else 1.0)
+    frame, wall, portal = settings.frame, settings.wall, Portal(panel)
+    x, found = float(panel.centre[0]), list[Cuboid]()
+    if scenario.frame:
+        depth = x - frame.thickness / 2.0, x + frame.thickness / 2.0
+        found += portal.around(depth, (frame.gap,) * 3, (frame.thickness,) * 3, FRAME)
+    if scenario.wall:
+        inset = frame.gap + (frame.thickness if scenario.frame else 0.0)
+        above = wall.height - float(panel.size[2]) - inset
+        depth = x - wall.thickness / 2.0, x + wall.thickness / 2.0
+        found += portal.around(depth, (inset,) * 3, (wall.width, wall.width, above), WALL)
+    return found
+
+
+def floor_cuboid(top: float, settings: FloorSettings, colour: Colour) -> Cuboid:
     """Return a floor whose surface has a height in the world frame, metres."""
     centre = (0.0, 0.0, top - settings.thickness / 2.0)
-    return _cuboid(centre, (settings.size, settings.size, settings.thickness), FLOOR)
+    return cuboid(centre, (settings.size, settings.size, settings.thickness), colour)
 
 
 def table_cuboids(settings: TableSettings) -> list[Cuboid]:
@@ -67,34 +65,6 @@ def table_cuboids(settings: TableSettings) -> list[Cuboid]:
     height, width, depth, thickness = settings
     foot = height - thickness
     return [
-        _cuboid((0.0, 0.0, -thickness / 2.0), (width, depth, thickness), TABLE),
-        _cuboid((0.0, 0.0, -thickness - foot / 2.0), (width / 2.0, depth / 2.0, foot), TABLE),
+        cuboid((0.0, 0.0, -thickness / 2.0), (width, depth, thickness), TABLE),
+        cuboid((0.0, 0.0, -thickness - foot / 2.0), (width / 2.0, depth / 2.0, foot), TABLE),
     ]
-
-
-def _portal(
-    panel: Cuboid,
-    inset: float,
-    width: float,
-    thickness: float,
-    colour: tuple[float, ...],
-    above: float | None = None,
-) -> list[Cuboid]:
-    """Return two posts beside the panel and a lintel above it, ``inset`` away from it."""
-    left, top = panel.size[1] / 2.0 + inset, panel.size[2] + inset
-    above = width if above is None else above
-    x, y = panel.centre[:2]
-    posts = [
-        _cuboid(
-            (x, y + side * (left + width / 2.0), (top + above) / 2.0),
-            (thickness, width, top + above),
-            colour,
-        )
-        for side in (-1.0, 1.0)
-    ]
-    lintel = _cuboid((x, y, top + above / 2.0), (thickness, 2.0 * left, above), colour)
-    return [*posts, lintel]
-
-
-def _cuboid(centre: ArrayLike, size: ArrayLike, colour: tuple[float, ...]) -> Cuboid:
-    return Cuboid(np.array(centre, dtype=np.float64), np.array(size, dtype=np.float64), colour)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_perception.model.parts import Joint
-from kmn_sim.world.cuboids import Cuboid
+from kmn_sim.world.cuboid import MATT, Cuboid
 from kmn_sim.world.scenario import Scenario
 
 
@@ -39,6 +39,7 @@ def door_urdf(
         origin = origins[joint.body]
         robot.append(_link(joint.body, cuboids[joint.body], origin, masses[joint.body]))
         robot.append(_joint(joint, origin - origins[joint.parent], limits[joint.name]))
+    ElementTree.indent(robot)  # pybullet's reader breaks long lines within a number
     return ElementTree.tostring(robot, encoding="unicode")
 
 
@@ -81,6 +82,7 @@ def _link(
             if kind == "visual":
                 material = ElementTree.SubElement(element, "material", name=f"{name}_{number}")
                 ElementTree.SubElement(material, "color", rgba=_text(cuboid.colour))
+                ElementTree.SubElement(material, "specular", rgb=_text(MATT))
     return link
 
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
 from kmn_sim.world.clipping import nearest_depth
+from kmn_sim.world.settings import LightSettings
 
 RENDERERS = ("egl", "software")
-LIGHT = (-3.0, -2.0, 4.0)  # direction towards the light, for pictures
 EGL_PLUGIN = "_eglRendererPlugin"
 EGL_READY, EGL_TIMEOUT = b"EGL is ready", 60.0  # seconds
 EGL_TRIAL = """
@@ -49,6 +49,8 @@ class Renderer:
         Client of the physics engine.
     wanted
         ``egl`` or ``software``; where EGL does not start, the software renderer takes over.
+    light
+        For pictures; EGL has one of its own.
 
     Attributes
     ----------
@@ -56,8 +58,8 @@ class Renderer:
         The renderer that is used.
     """
 
-    def __init__(self, physics: Any, wanted: str) -> None:
-        self._physics = physics
+    def __init__(self, physics: Any, wanted: str, light: LightSettings) -> None:
+        self._physics, self._light = physics, light
         self._plugin = _load_egl(physics) if wanted == "egl" else -1
         self.name = "egl" if self._plugin >= 0 else "software"
 
@@ -81,7 +83,10 @@ class Renderer:
             viewMatrix=(FLIP @ camera.world_to_camera).T.ravel().tolist(),
             projectionMatrix=_projection(camera).T.ravel().tolist(),
             shadow=0,
-            lightDirection=LIGHT,
+            lightDirection=self._light.direction,
+            lightAmbientCoeff=self._light.ambient,
+            lightDiffuseCoeff=self._light.diffuse,
+            lightSpecularCoeff=0.0,
             renderer=(
                 pybullet.ER_BULLET_HARDWARE_OPENGL if hardware else pybullet.ER_TINY_RENDERER
             ),

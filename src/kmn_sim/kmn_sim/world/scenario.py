@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.world.room import Room, Way
+from kmn_sim.world.room_settings import RoomSettings
 
 DIRECTIONS = ("pull", "push")
 
@@ -34,6 +37,8 @@ class Scenario:
         Whether there is a floor.
     table
         Whether a box stands on a table; then z = 0 is the table's top.
+    room
+        That a door stands in, instead of frame and wall alone.
     """
 
     model: KinematicModel
@@ -44,6 +49,7 @@ class Scenario:
     wall: bool = False
     floor: bool = True
     table: bool = False
+    room: Room | None = None
 
     def __post_init__(self) -> None:
         if self.direction not in DIRECTIONS:
@@ -76,3 +82,30 @@ class Scenario:
     def gamma(self) -> NDArray[np.float64]:
         """(m,) configuration parameters."""
         return self.model.split(self.values)[1]
+
+
+def in_room(scenario: Scenario, seed: int, recess: float | None = None) -> Scenario:
+    """Return a scenario whose door stands in a room that is drawn by a seed.
+
+    Parameters
+    ----------
+    recess
+        Given instead of drawn, metres.
+
+    Raises
+    ------
+    ScenarioError
+        If the object is no door, or has frame or wall already.
+    """
+    if not scenario.is_door:
+        raise ScenarioError(
+            f"'room' is for doors, model '{scenario.model.name}' has no joints: leave it out"
+        )
+    if scenario.frame or scenario.wall:
+        raise ScenarioError("a 'room' has its own frame and wall: leave 'frame' and 'wall' out")
+    robot = RobotSettings.load()
+    x, y = (robot.home[name] for name in robot.base_names[:2])
+    way = Way.of(scenario.model, scenario.values, (x, y))
+    return replace(
+        scenario, room=Room.draw(RoomSettings.load(), scenario.direction, seed, way, recess)
+    )

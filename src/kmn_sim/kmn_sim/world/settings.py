@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.settings import NonNegative, Positive, load_settings
+from kmn_perception.configuration.settings import Fraction, NonNegative, Positive, load_settings
 from kmn_sim.robot.settings import RobotSettings
 
 
@@ -18,13 +18,22 @@ class FloorSettings(NamedTuple):
     thickness: Positive
 
 
+class LightSettings(NamedTuple):
+    """Direction towards the light, and how much of it surfaces scatter: of all, and of its own."""
+
+    direction: tuple[float, float, float]
+    ambient: Fraction
+    diffuse: Fraction
+
+
 class PhysicsSettings(NamedTuple):
-    """Steps a second, iterations of the solver in each, gravity in m/s^2, and the floor."""
+    """Steps a second, iterations of the solver in each, gravity in m/s^2, floor and light."""
 
     rate: Annotated[int, Field(ge=60, le=10_000)]
     solver_iterations: Annotated[int, Field(ge=1, le=10_000)]
     gravity: NonNegative
     floor: FloorSettings
+    light: LightSettings
 
 
 class PanelSettings(NamedTuple):

@@ -13,7 +13,8 @@ from kmn_sim.control.trajectory_controller import TrajectoryController
 from kmn_sim.robot.pr2_model import pr2_urdf
 from kmn_sim.robot.simulated_robot import SimulatedRobot
 from kmn_sim.world.carton import Carton
-from kmn_sim.world.cuboids import Cuboid, door_cuboids, floor_cuboid, table_cuboids
+from kmn_sim.world.cuboid import MATT, Cuboid
+from kmn_sim.world.cuboids import FLOOR, door_cuboids, floor_cuboid, table_cuboids
 from kmn_sim.world.door import Door
 from kmn_sim.world.physics import Physics
 from kmn_sim.world.renderer import Renderer
@@ -67,7 +68,7 @@ class Simulation:
         self._from_desired_state = from_desired_state
         self.physics: Any = Physics(gui)
         # Before there are bodies: a renderer does not know of those that were there before it.
-        self.renderer = Renderer(self.physics, renderer)
+        self.renderer = Renderer(self.physics, renderer, settings.physics.light)
         self.step_time = 1.0 / settings.physics.rate
         self._steps = 0
         self.build(scenario)
@@ -152,7 +153,9 @@ class Simulation:
         return table_cuboids(self.settings.box.table) if self.scenario.table else []
 
     def _ground(self) -> list[Cuboid]:
-        ground = floor_cuboid(self.floor, self.settings.physics.floor)
+        room = self.scenario.room
+        colour = FLOOR if room is None else room.colours["floor"]
+        ground = floor_cuboid(self.floor, self.settings.physics.floor, colour)
         return [ground] if self.scenario.floor else []
 
     def _stand(self, cuboids: Sequence[Cuboid]) -> int:
@@ -164,7 +167,10 @@ class Simulation:
                 0.0,
                 physics.createCollisionShape(physics.GEOM_BOX, halfExtents=half),
                 physics.createVisualShape(
-                    physics.GEOM_BOX, halfExtents=half, rgbaColor=cuboid.colour
+                    physics.GEOM_BOX,
+                    halfExtents=half,
+                    rgbaColor=cuboid.colour,
+                    specularColor=MATT,
                 ),
                 cuboid.centre.tolist(),
             )

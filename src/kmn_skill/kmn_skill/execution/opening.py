@@ -28,6 +28,7 @@ from kmn_skill.planning.layout import HANDLE, HINGE
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
+from kmn_skill.planning.surroundings import WALL, Obstacle, SurroundingsSettings, wall_around
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
 # Why a door that the robot hides from the camera is not to be relied on.
@@ -48,6 +49,8 @@ class OpeningSettings:
         By which the angles (rad) may miss the goal.
     hidden_distance
         Metres after which the robot hides the door; then where it was before is relied upon.
+    surroundings, recess
+        Whether a ``wall`` stands around the door, and how deep (m) the panel's front lies in it.
     """
 
     door_timeout: float
@@ -55,6 +58,8 @@ class OpeningSettings:
     handle_tolerance: float
     door_tolerance: float
     hidden_distance: float
+    surroundings: str
+    recess: float
 
 
 class Knowledge(NamedTuple):
@@ -68,12 +73,15 @@ class Knowledge(NamedTuple):
         The door as it is seen, and as it was seen before the robot hid it.
     watch
         Of the states of robot and door.
+    wall
+        Around the door, where there is one.
     """
 
     model: KinematicModel
     door: PerceivedDoor
     memory: DoorMemory
     watch: StateWatch
+    wall: SurroundingsSettings
 
 
 class DoorOpening:
@@ -100,7 +108,7 @@ class DoorOpening:
         settings: OpeningSettings,
         execution: ExecutionSettings,
     ) -> None:
-        self._model, self._door, self._memory, self._watch = knowledge
+        self._model, self._door, self._memory, self._watch, self._wall = knowledge
         self._planner, self._commands, self._client = planner, commands, client
         self._settings, self._execution = settings, execution
         self._breaks = self._watch.breaks
@@ -201,6 +209,7 @@ class DoorOpening:
             door_start=np.array([state.hinge, state.handle]),
             handle_angle=goal.handle_angle,
             door_angle=goal.door_angle,
+            obstacles=self._obstacles(gamma),
         )
         try:
             plan = self._planner.plan(request, lambda: self._client.interruption() is not None)
@@ -212,6 +221,12 @@ class DoorOpening:
         self._plan_report = plan.report
         self._commands.show(plan, values)
         return plan
+
+    def _obstacles(self, gamma: NDArray[np.float64]) -> tuple[Obstacle, ...]:
+        """Return what stands around a door of configuration parameters (m,)."""
+        if self._settings.surroundings != WALL:
+            return ()
+        return wall_around(self._model, gamma, self._settings.recess, self._wall)
 
     def _follow(self, plan: Plan) -> None:
         """Send a plan part by part until all is done and at rest."""

@@ -13,7 +13,7 @@ from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
-from kmn_skill.experiments.evaluate import NOISES, random_doors
+from kmn_skill.experiments.evaluate import NOISES, random_doors, random_rooms
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
@@ -25,12 +25,14 @@ def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     values = random_doors(model, 1, options.seed)[0]
     goal, pace = experiment.goal(options.mode), experiment.demo
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
+    sim["renderer"] = "software"  # whose light is ours
     options.out.mkdir(parents=True, exist_ok=True)
     recording = options.out / f"door_{options.mode}_{options.seed}.gif"
     strip = recording.with_suffix(".png")
-    print("starting sim_node, morph_node and skill_node (20 seconds)", flush=True)
-    with DoorSystem(sim, "perceived", experiment.timeouts) as system:
-        system.show(values, options.mode)
+    nodes = "sim_node, morph_node" if options.parameters == "perceived" else "sim_node"
+    print(f"starting {nodes} and skill_node (20 seconds)", flush=True)
+    with DoorSystem(sim, options.parameters, experiment.timeouts) as system:
+        system.show(values, options.mode, random_rooms(options, 1)[0])
         system.record(recording, experiment.recording.rate)
         print(f"opening a door (seed {options.seed}, {options.mode}):", flush=True)
         opened = system.open(goal, Narrator().tell)
@@ -70,6 +72,17 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="demo", description=__doc__)
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of door and noise")
     parser.add_argument("--mode", choices=tuple(MODES), default="pull")
+    parser.add_argument(
+        "--parameters",
+        choices=("perceived", "true"),
+        default="perceived",
+        help="what the robot knows of the door (default perceived)",
+    )
+    parser.add_argument(
+        "--room",
+        action="store_true",
+        help="the door stands in a room; with true parameters, as perception needs a bare door",
+    )
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(
         "--out",
@@ -77,7 +90,10 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         default=Path("outputs/door_demo"),
         help="folder of recording and pictures",
     )
-    return parser.parse_args(argv)
+    options = parser.parse_args(argv)
+    if options.room and options.parameters != "true":
+        parser.error("a door in a room is not perceived yet: --room needs --parameters true")
+    return options
 
 
 def main() -> int:

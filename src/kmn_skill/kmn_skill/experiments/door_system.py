@@ -27,6 +27,7 @@ from kmn_perception.ros.node_process import NodeProcess, ProcessClient, paramete
 from kmn_skill.execution.goal import Goal
 from kmn_skill.experiments.settings import Timeouts
 from kmn_skill.planning.layout import HINGE
+from kmn_skill.planning.surroundings import WALL
 
 QUEUE_DEPTH = 10
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
@@ -35,6 +36,13 @@ SOURCES = {  # of the door's parameters, and the topic that skill_node takes the
     "true": "ground_truth",
     "prototype": "prototype_parameters",
 }
+
+
+class Room(NamedTuple):
+    """A simulated room: its seed, and the recess of the door in it, metres."""
+
+    seed: int
+    recess: float
 
 
 class Patience(NamedTuple):
@@ -123,13 +131,23 @@ class DoorSystem:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def show(self, values: NDArray[np.float64], direction: str) -> None:
+    def show(self, values: NDArray[np.float64], direction: str, room: Room | None = None) -> None:
         """Set up a closed door of morphing parameters (n + m,), and the robot where it starts.
 
         Returns when skill_node knows of this door only.
+
+        Parameters
+        ----------
+        room
+            That the door stands in.
         """
         scene = self._timeouts.scene
-        self._set(placement="given", values=[float(v) for v in values], direction=direction)
+        around = {"room": False} if room is None else {"room": True, **room._asdict()}
+        given = [float(value) for value in values]
+        self._set(placement="given", values=given, direction=direction, **around)
+        if room is not None:
+            wall = {"surroundings": WALL, "recess": room.recess}
+            self._client.set_parameters(self._knowing, wall, scene)
         self._truth = None
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
@@ -184,6 +202,9 @@ class DoorSystem:
         self._setting = node.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )
+        self._knowing = node.create_client(
+            SetParametersAtomically, "skill_node/set_parameters_atomically"
+        )
         self._prototype = node.create_publisher(
             MorphingParameters, SOURCES["prototype"], QUEUE_DEPTH
         )
@@ -201,6 +222,7 @@ class DoorSystem:
     def _is_ready(self) -> bool:
         return (
             self._setting.service_is_ready()
+            and self._knowing.service_is_ready()
             and self._action.server_is_ready()
             and self._truth is not None
             and len(self._taken) > 0

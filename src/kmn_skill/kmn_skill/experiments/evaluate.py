@@ -17,11 +17,12 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
-from kmn_skill.experiments.door_system import SOURCES, DoorSystem
+from kmn_skill.experiments.door_system import SOURCES, DoorSystem, Room
 from kmn_skill.experiments.film_strip import save_strip
-from kmn_skill.experiments.settings import MODES, Experiment
+from kmn_skill.experiments.settings import MODES, Experiment, random_recesses
 
 NOISES = ("none", "kinect")
+NAMED = ("mode", "parameters", "noise", "seed", "room")  # options that are kept with the result
 
 
 class Trial(NamedTuple):
@@ -64,10 +65,19 @@ def random_doors(model: KinematicModel, count: int, seed: int) -> NDArray[np.flo
     return model.sample(np.random.default_rng(seed), count)
 
 
+def random_rooms(options: argparse.Namespace, count: int) -> list[Room] | list[None]:
+    """Return the rooms of so many doors, or none of them if they stand alone."""
+    if not options.room:
+        return [None] * count
+    recesses = random_recesses(options.mode, count, options.seed)
+    return [Room(options.seed + number, recess) for number, recess in enumerate(recesses)]
+
+
 def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
     """Open all doors, one after the other."""
     model = KinematicModel.load(experiment.model)
     doors = random_doors(model, options.doors, options.seed)
+    rooms = random_rooms(options, options.doors)
     pace = experiment.evaluation
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
     trials: list[Trial] = []
@@ -75,8 +85,9 @@ def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
         DoorSystem(sim, options.parameters, experiment.timeouts) as system,
         tqdm(doors, unit="door") as bar,
     ):
-        for values in bar:
+        for values, room in zip(bar, rooms, strict=True):
             strip = options.strip if not trials else None
+            system.show(values, options.mode, room)
             trials.append(_open(system, values, options.mode, experiment, strip))
             bar.set_postfix_str(f"{sum(trial.opened for trial in trials)} open")
     return trials
@@ -89,8 +100,7 @@ def _open(
     experiment: Experiment,
     strip: Path | None,
 ) -> Trial:
-    """Open one door; save a strip of pictures of it if that is asked for."""
-    system.show(values, mode)
+    """Open the door that is shown; save a strip of pictures of it if that is asked for."""
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / "recording.gif"
         if strip:
@@ -175,6 +185,11 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         "(default), or the prototype's, which shows what the transfer is worth",
     )
     parser.add_argument("--noise", choices=NOISES, default="none", help="default none")
+    parser.add_argument(
+        "--room",
+        action="store_true",
+        help="the doors stand in rooms, whose wall the robot knows as it knows the true parameters",
+    )
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of doors and noise")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     parser.add_argument("--strip", type=output_file, help="file for pictures of the first door")
@@ -188,6 +203,6 @@ def main() -> int:
         result = tally(run(options, Experiment.load()))
     print(table(result))
     if options.json:
-        named = {name: getattr(options, name) for name in ("mode", "parameters", "noise", "seed")}
+        named = {name: getattr(options, name) for name in NAMED}
         write_json(options.json, {**named, **result})
     return 0

@@ -1,4 +1,6 @@
-"""Solve the policy for the prototype without a solution to start from, and keep the best.
+"""Solve the policy for some doors without solutions to start from, and keep the best.
+
+Those in a wall are solved one from the other.
 
 Run as ``./run kmn_skill make_prototypes FILE``; it writes ``config/skill/prototypes.json``.
 """
@@ -14,13 +16,13 @@ from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.settings import MODES, Experiment, PrototypeGuesses
+from kmn_skill.experiments.settings import MODES, Experiment
 from kmn_skill.planning.check import PlanRejected
 from kmn_skill.planning.layout import ARM, BASE, BASE_AND_ARM, DOOR, GRIPPER, HANDLE, HINGE, ROBOT
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
-from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.prototypes import PUSH, PUSH_IN_WALL, Prototypes, Solution
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.solver import Solver
 from kmn_skill.planning.transfer import transfer
@@ -29,7 +31,8 @@ from kmn_skill.planning.transfer import transfer
 def key_frame(
     request: PlanRequest,
     skill: SkillSettings,
-    settings: PrototypeGuesses,
+    side: float,
+    spread: float,
     generator: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Return a guess (T + 1, D): drive before the door, hold a random posture, follow the door."""
@@ -37,9 +40,9 @@ def key_frame(
     times = np.arange(PHASE_COUNT * slices + 1) / slices
     path = np.zeros((len(times), request.configuration.size))
     posture = request.start.copy()
-    posture[BASE] = skill.policy.base[0], settings.side, 0.0
+    posture[BASE] = skill.policy.base[0], side, 0.0
     arm = posture[ARM]
-    arm += generator.normal(0.0, settings.spread, arm.size)
+    arm += generator.normal(0.0, spread, arm.size)
     posture[GRIPPER] = skill.policy.open_gripper
     reached = np.clip(times / PhaseEnd.PRE_GRASP, 0.0, 1.0)[:, None]
     path[:, ROBOT] = request.start + (posture - request.start) * reached
@@ -50,24 +53,33 @@ def key_frame(
 
 
 def best_solution(
-    setup: PlanningSetup, request: PlanRequest, settings: PrototypeGuesses, tries: int
-) -> NDArray[np.float64]:
-    """Return the smoothest of the solutions (T + 1, D) from random guesses, with its start.
+    solver: Solver,
+    setup: PlanningSetup,
+    request: PlanRequest,
+    sides: tuple[float, float],
+    spread: float,
+    tries: int,
+) -> Solution:
+    """Return the smoothest of the solutions from random guesses.
+
+    Parameters
+    ----------
+    sides, spread
+        Between which the base stands (m), and the arm's standard deviation (rad) in the guesses.
 
     Raises
     ------
     PlanRejected
         If there is none.
     """
-    solver = Solver(setup)
-    world = solver.world(request.theta, request.gamma)
     generator = np.random.default_rng(0)
-    found: list[NDArray[np.float64]] = []
+    found: list[Solution] = []
     for _ in tqdm(range(tries), unit="guess"):
-        guess = key_frame(request, setup.settings, settings, generator)
-        guess = transfer(guess, setup.model, request)
+        side = generator.uniform(*sides) if sides[0] < sides[1] else sides[0]
+        path = key_frame(request, setup.settings, side, spread, generator)
         try:
-            found.append(np.vstack([request.configuration, solver.coarse(world, request, guess)]))
+            guess = transfer(Solution(request.gamma, path), setup.model, request)
+            found.append(solved(solver, request, guess))
         except PlanRejected:
             continue
     if not found:
@@ -75,9 +87,35 @@ def best_solution(
     return min(found, key=_roughness)
 
 
-def _roughness(path: NDArray[np.float64]) -> float:
+def solved(solver: Solver, request: PlanRequest, guess: NDArray[np.float64]) -> Solution:
+    """Return the solution to which a guess (T, D) leads; raise `PlanRejected` if to none."""
+    path = solver.coarse(solver.world(request), request, guess)
+    return Solution(request.gamma, np.vstack([request.configuration, path]))
+
+
+def walled_solutions(setup: PlanningSetup, experiment: Experiment, mode: str) -> list[Solution]:
+    """Return solutions for doors in a wall, each from the one before; see `best_solution`."""
+    solver, settings = Solver(setup), experiment.prototypes
+    names = [parameter.name for parameter in setup.model.parameters]
+    kept: list[Solution] = []
+    before: Solution | None = None
+    for door in tqdm(settings.walled.doors, unit="door"):
+        values = setup.model.prototype.copy()
+        for name, value in door.gamma.items():
+            values[names.index(name)] = value
+        request = experiment.request(setup, values, mode, door.recess)
+        if before is None:
+            _, tries, sides = settings.walled
+            before = best_solution(solver, setup, request, sides, settings.spread, tries)
+        else:
+            before = solved(solver, request, before.path[1:])
+        kept += [before] if door.kept else []
+    return kept
+
+
+def _roughness(solution: Solution) -> float:
     """Return the sum of the squared accelerations of base and arm."""
-    return float(np.square(np.diff(path, 2, axis=0)[:, ROBOT][:, BASE_AND_ARM]).sum())
+    return float(np.square(np.diff(solution.path, 2, axis=0)[:, ROBOT][:, BASE_AND_ARM]).sum())
 
 
 def main() -> int:
@@ -88,9 +126,14 @@ def main() -> int:
     options = parser.parse_args()
     experiment = Experiment.load()
     setup = PlanningSetup.load(KinematicModel.load(experiment.model))
+    solver, guesses = Solver(setup), experiment.prototypes
     solutions = {}
     for mode in MODES:
         request = experiment.request(setup, setup.model.prototype, mode)
-        solutions[mode] = best_solution(setup, request, experiment.prototypes, options.tries)
+        sides = guesses.side, guesses.side
+        solutions[mode] = [
+            best_solution(solver, setup, request, sides, guesses.spread, options.tries)
+        ]
+    solutions[PUSH_IN_WALL] = walled_solutions(setup, experiment, PUSH)
     Prototypes(setup.joint_names, solutions).save(Path(options.file))
     return 0

@@ -16,11 +16,11 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.settings import MODES, Experiment
+from kmn_skill.experiments.settings import MODES, Experiment, random_recesses
 from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
-from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.prototypes import SOLUTIONS, Prototypes
 
 
 class Planned(NamedTuple):
@@ -67,7 +67,7 @@ def tally(doors: Sequence[Planned]) -> dict[str, Any]:
         }
         result["contact_error_m"] = {"max": max(report.contact_error for report in reports)}
         result["clearance_m"] = {"min": min(report.clearance for report in reports)}
-        result["varied"] = sum("varied" in report.seed_used for report in reports)
+        result["varied"] = sum(report.seed_used not in SOLUTIONS for report in reports)
     result["failures"] = [
         {"door": number, "values": door.values.tolist(), "reason": door.reason}
         for number, door in enumerate(doors)
@@ -97,18 +97,23 @@ def main() -> int:
     parser.add_argument("--doors", type=whole_number(1), default=100, help="default 100")
     parser.add_argument("--mode", choices=tuple(MODES), default="pull")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of the doors")
+    parser.add_argument("--room", action="store_true", help="the doors stand in walls")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     options = parser.parse_args()
     experiment = Experiment.load()
     setup = PlanningSetup.load(KinematicModel.load(experiment.model))
     doors = setup.model.sample(np.random.default_rng(options.seed), options.doors)
+    recesses = iter(random_recesses(options.mode, options.doors, options.seed))
+
+    def request(values: NDArray[np.float64]) -> PlanRequest:
+        recess = next(recesses) if options.room else None
+        return experiment.request(setup, values, options.mode, recess)
+
     with Planner(setup, Prototypes.load()) as planner:
-        planned = plan_doors(
-            planner, doors, lambda values: experiment.request(setup, values, options.mode)
-        )
+        planned = plan_doors(planner, doors, request)
     result = tally(planned)
     print(table(result))
     if options.json:
-        named = {"mode": options.mode, "seed": options.seed}
+        named = {"mode": options.mode, "seed": options.seed, "room": options.room}
         write_json(options.json, {**named, **result})
     return 0

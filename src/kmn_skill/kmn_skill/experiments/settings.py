@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.settings import NonNegative, Positive, load_settings
+from kmn_perception.configuration.settings import Interval, NonNegative, Positive, load_settings
 from kmn_skill.execution.goal import Goal
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import PULL, PUSH
+from kmn_skill.planning.surroundings import Obstacle, wall_around
 
 MODES = {PULL: -1.0, PUSH: 1.0}  # and the sign of the door's angle
 
@@ -51,11 +52,58 @@ class Recording(NamedTuple):
     strip: Annotated[int, Field(ge=1, le=20)]
 
 
+class WalledDoor(NamedTuple):
+    """A door in a wall.
+
+    Attributes
+    ----------
+    gamma
+        Configuration parameters by name that are not the prototype's.
+    recess
+        Of the panel, metres.
+    kept
+        Whether its solution is kept.
+    """
+
+    gamma: dict[str, float]
+    recess: NonNegative
+    kept: bool = False
+
+
+class WalledGuesses(NamedTuple):
+    """How doors in walls are solved for.
+
+    Attributes
+    ----------
+    doors
+        Of which each is solved from the solution of the one before, the first from random guesses.
+    tries
+        Number of these guesses.
+    sides
+        Between which the base stands at the handle in them, metres along y.
+    """
+
+    doors: Annotated[tuple[WalledDoor, ...], Field(min_length=1)]
+    tries: Annotated[int, Field(ge=1)]
+    sides: Interval
+
+
 class PrototypeGuesses(NamedTuple):
-    """Where the base stands at the handle, metres along y, and the arm's deviation, radians."""
+    """Guesses from which the policy is solved without a prototype's solution.
+
+    Attributes
+    ----------
+    side
+        Where the base stands at the handle, metres along y.
+    spread
+        Standard deviation of the arm, radians.
+    walled
+        For doors that are pushed in a wall.
+    """
 
     side: float
     spread: NonNegative
+    walled: WalledGuesses
 
 
 class Experiment(NamedTuple):
@@ -74,7 +122,7 @@ class Experiment(NamedTuple):
     timeouts, recording
         How long to wait for what, and what is recorded.
     prototypes
-        Guesses from which the policy is solved without a prototype's solution.
+        How the solutions are made that plans start from.
     """
 
     model: str
@@ -96,11 +144,43 @@ class Experiment(NamedTuple):
         """Return the goal of a mode, ``pull`` or ``push``."""
         return Goal(self.handle_angle, MODES[mode] * self.door_angle)
 
-    def request(self, setup: PlanningSetup, values: NDArray[np.float64], mode: str) -> PlanRequest:
-        """Return the request to open a closed door of parameters (n + m,) from the robot's home."""
+    def request(
+        self,
+        setup: PlanningSetup,
+        values: NDArray[np.float64],
+        mode: str,
+        recess: float | None = None,
+    ) -> PlanRequest:
+        """Return the request to open a closed door of parameters (n + m,) from the robot's home.
+
+        Parameters
+        ----------
+        recess
+            Of the panel in its wall, metres; None: there is no wall.
+        """
         closed, goal = np.zeros(len(setup.model.joints)), self.goal(mode)
-        return PlanRequest(*setup.model.split(values), setup.robot.home, closed, *goal)
+        theta, gamma = setup.model.split(values)
+        around: tuple[Obstacle, ...] = ()
+        if recess is not None:
+            around = wall_around(setup.model, gamma, recess, setup.settings.surroundings)
+        return PlanRequest(theta, gamma, setup.robot.home, closed, *goal, around)
 
     def is_open(self, mode: str, hinge: float) -> bool:
         """Tell whether a door at this hinge angle (rad) is open to the right side."""
         return MODES[mode] * hinge >= self.opened
+
+
+class RecessLimits(NamedTuple):
+    """Recesses of the doors in a simulated room, metres."""
+
+    pull: tuple[NonNegative, NonNegative]
+    push: tuple[NonNegative, NonNegative]
+
+
+def random_recesses(mode: str, count: int, seed: int) -> list[float]:
+    """Draw the recesses of doors in rooms, metres, within the simulator's limits."""
+    file = resources.find("config/simulation", "room")
+    limits = load_settings(RecessLimits, file, "recess")
+    generator = np.random.default_rng(seed)
+    low, high = getattr(limits, mode)
+    return [float(generator.uniform(low, high)) for _ in range(count)]

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_skill.planning.surroundings import Obstacle
+
 
 class PlanningFailed(Exception):  # noqa: N818
     """No plan was found that passes the check; the text says why."""
@@ -34,6 +36,8 @@ class PlanRequest:
     door_angle
         Angle to which the door is opened, radians: negative towards a robot before the door
         (pull), positive away from it (push).
+    obstacles
+        What stands around the door.
     """
 
     theta: NDArray[np.float64]
@@ -42,6 +46,7 @@ class PlanRequest:
     door_start: NDArray[np.float64]
     handle_angle: float
     door_angle: float
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def configuration(self) -> NDArray[np.float64]:

@@ -87,7 +87,7 @@ class Planner:
         begin, left = time.monotonic(), self._time_limit
         reasons = []
         for guess in self._prototypes.guesses(
-            request.door_angle, self._settings.attempts, self._settings.spread
+            request, self._settings.attempts, self._settings.spread
         ):
             if left <= 0.0:
                 reasons.append(f"the {self._time_limit:g} s are over")

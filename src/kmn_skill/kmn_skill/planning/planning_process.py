@@ -31,7 +31,7 @@ def _answer(connection: Connection, setup: PlanningSetup) -> None:
         except (EOFError, OSError):
             return
         try:
-            connection.send(solver.plan(request, guess.path, guess.name))
+            connection.send(solver.plan(request, guess.solution, guess.name))
         except PlanRejected as error:
             connection.send(str(error))
         except RuntimeError as error:  # what the package robotic raises

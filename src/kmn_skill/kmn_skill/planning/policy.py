@@ -143,6 +143,7 @@ def pairs(world: World) -> list[Pair]:
     panel, handle = (door_body(name) for name in world.door_bodies)
     door = [(body, panel) for body in settings.door_collisions]
     door += [(body, handle) for body in settings.handle_collisions]
+    door += [(body, name) for name in world.obstacle_names for body in settings.obstacle_collisions]
     own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
     always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*door, *own)]
     before = float(PhaseEnd.PRE_GRASP)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.settings import Count, NonNegative, Positive, load_settings
+from kmn_skill.planning.surroundings import SurroundingsSettings
 
 Names = tuple[str, ...]
 
@@ -49,6 +50,8 @@ class PolicySettings(NamedTuple):
         Of the features, by name.
     door_collisions, handle_collisions, approach_collisions
         Bodies of the robot that must not touch panel or handle, the last ones before the handle.
+    obstacle_collisions
+        Bodies of the robot that must not touch what stands around the door.
     self_collisions
         Bodies of the arm, and those that each of them must not touch.
     """
@@ -61,6 +64,7 @@ class PolicySettings(NamedTuple):
     door_collisions: Names
     handle_collisions: Names
     approach_collisions: Names
+    obstacle_collisions: Names
     self_collisions: dict[str, Names]
 
 
@@ -146,6 +150,8 @@ class SkillSettings:
         The robot that the policy is for: a name in ``config/robots``.
     solver
         Options of the augmented Lagrangian, by their names.
+    surroundings
+        The wall around the door, where there is one.
     """
 
     robot: str
@@ -155,6 +161,7 @@ class SkillSettings:
     solver: dict[str, int | float]
     timing: TimingSettings
     check: CheckSettings
+    surroundings: SurroundingsSettings
 
     @classmethod
     def load(cls, name_or_path: str | Path = "door") -> SkillSettings:

@@ -15,6 +15,7 @@ from kmn_skill.planning.layout import DOOR, ROBOT
 from kmn_skill.planning.plan import Plan, PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
+from kmn_skill.planning.prototypes import Solution
 from kmn_skill.planning.release import release
 from kmn_skill.planning.timing import preceded, timed_plan
 from kmn_skill.planning.transfer import refine, transfer
@@ -26,19 +27,19 @@ class Solver:
 
     def __init__(self, setup: PlanningSetup) -> None:
         self._setup = setup
-        self.world(*setup.model.split(setup.model.prototype))
+        World(setup, *setup.model.split(setup.model.prototype))
 
-    def world(self, theta: NDArray[np.float64], gamma: NDArray[np.float64]) -> World:
-        """Return the world of the door m(theta, gamma)."""
-        return World(self._setup, theta, gamma)
+    def world(self, request: PlanRequest) -> World:
+        """Return the world of a request's door and of what stands around it."""
+        return World(self._setup, request.theta, request.gamma, request.obstacles)
 
-    def plan(self, request: PlanRequest, guess: NDArray[np.float64], name: str) -> Plan:
+    def plan(self, request: PlanRequest, guess: Solution, name: str) -> Plan:
         """Return a plan that passes the check.
 
         Parameters
         ----------
         guess
-            (T + 1, D) solution for a prototype, to be transferred.
+            Solution for another door, to be transferred.
         name
             Of the guess.
 
@@ -48,7 +49,7 @@ class Solver:
             If the solution does not pass.
         """
         model, robot, settings = self._setup.model, self._setup.robot, self._setup.settings
-        world = self.world(request.theta, request.gamma)
+        world = self.world(request)
         first = np.vstack([request.configuration, release(world, request, settings)])
         begin = replace(request, start=first[-1, ROBOT], door_start=first[-1, DOOR])
         path = self._solve(world, begin, transfer(guess, model, begin))

@@ -1,4 +1,4 @@
-"""Transfer of the prototype's solution to a door, as the first guess of the policy's solution."""
+"""Transfer of a solution for one door to another, as the first guess of the policy's solution."""
 
 from __future__ import annotations
 
@@ -11,33 +11,34 @@ from kmn_skill.planning.kinematics import turn
 from kmn_skill.planning.layout import BASE, DOOR, HANDLE, HINGE, ROBOT
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.prototypes import Solution
 
 
 def transfer(
-    path: NDArray[np.float64], model: KinematicModel, request: PlanRequest
+    solution: Solution, model: KinematicModel, request: PlanRequest
 ) -> NDArray[np.float64]:
-    """Return a path (T, D) for a door, made from the prototype's.
+    """Return a path (T, D) for a door, made from the solution for another one.
 
     The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
-    is to turn by other angles than the prototype, or is ajar, the base also turns with it about
+    is to turn by other angles than the other one, or is ajar, the base also turns with it about
     its hinge. The remaining difference to the present state fades out up to the pre-grasp pose.
 
     Parameters
     ----------
-    path
-        (T + 1, D) of the prototype, with the start.
+    solution
+        For a door at the origin.
     """
+    solved, path = solution
     guess = path.copy()
     for column, goal in ((HINGE, request.door_angle), (HANDLE, request.handle_angle)):
         angles = guess[:, DOOR][:, column]
         angles[:] = _stretched(angles, request.door_start[column], goal)
-    _, prototype = model.split(model.prototype)
     pose = model.transformation.matrix(request.theta)
     hinge, handle = model.joints
     shift = np.eye(4)
-    shift[:3, 3] = handle.origin(request.gamma) - handle.origin(prototype)
+    shift[:3, 3] = handle.origin(request.gamma) - handle.origin(solved)
     for before, after in zip(path, guess, strict=True):
-        closing = np.linalg.inv(turn(hinge, prototype, before[DOOR][HINGE]))
+        closing = np.linalg.inv(turn(hinge, solved, before[DOOR][HINGE]))
         opening = turn(hinge, request.gamma, after[DOOR][HINGE])
         after[BASE] = move_base(before[BASE], pose @ opening @ shift @ closing)
     before_handle = PhaseEnd.PRE_GRASP * ((len(path) - 1) // PHASE_COUNT)

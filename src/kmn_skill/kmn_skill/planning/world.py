@@ -6,7 +6,7 @@ whole configuration for every time step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -20,6 +20,7 @@ from kmn_skill.planning.clearance import Box, Surface, sample_surface
 from kmn_skill.planning.layout import ARM, HANDLE
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.robot import RobotModel
+from kmn_skill.planning.surroundings import Obstacle
 
 PADS, CONTACTS = ("left_pad", "right_pad"), ("left_contact", "right_contact")
 TOOL, GRASP, OBJECT = "tool", "grasp", "object"
@@ -40,6 +41,8 @@ class World:
     ----------
     theta, gamma
         (n,) transformation and (m,) configuration parameters.
+    obstacles
+        What stands around the door.
 
     Attributes
     ----------
@@ -51,22 +54,31 @@ class World:
         The same joints in the configuration, which has one for the base.
     door_bodies
         Bodies of the kinematic model that hinge and handle move.
+    obstacle_names
+        Of what stands around the door.
     touching
         The gripper's angle at which the pads touch the handle, radians.
     """
 
     def __init__(
-        self, setup: PlanningSetup, theta: NDArray[np.float64], gamma: NDArray[np.float64]
+        self,
+        setup: PlanningSetup,
+        theta: NDArray[np.float64],
+        gamma: NDArray[np.float64],
+        obstacles: Sequence[Obstacle] = (),
     ) -> None:
         model, robot = setup.model, setup.robot
-        self.setup, self._gamma = setup, gamma
+        self.setup, self._gamma, self._obstacles = setup, gamma, obstacles
         self.joint_names = setup.joint_names
         self.model_joints = (*robot.model_joints, *(joint.name for joint in model.joints))
         self.door_bodies = tuple(joint.body for joint in model.joints)
+        self.obstacle_names = tuple(obstacle.name for obstacle in obstacles)
         self.configuration = ry.Config()
         self.configuration.addFrame("world")
         _add_robot(self.configuration, robot)
         _add_door(self.configuration, model, theta, gamma)
+        for name, centre, size in obstacles:
+            _add(self.configuration, name, OBJECT, centre).setShape(ry.ST.box, size)
         self._add_contacts()
         self.configuration.selectJoints(list(self.model_joints))
 
@@ -88,7 +100,7 @@ class World:
         return poses
 
     def door_boxes(self) -> dict[str, Box]:
-        """Return the boxes of the door's bodies, and of the `STEM` if it has one."""
+        """Return the boxes of the door's bodies, of the `STEM` if it has one, and around it."""
         model, gamma = self.setup.model, self._gamma
         found = {
             body.name: Box(door_body(body.name), np.zeros(3), body.size(gamma))
@@ -98,6 +110,7 @@ class World:
             joint = model.stem.joint
             centre, size = model.stem.cuboid(gamma)
             found[STEM] = Box(joint.name, centre - joint.origin(gamma), size)
+        found.update({o.name: Box(OBJECT, o.centre, o.size) for o in self._obstacles})
         return found
 
     def _add_contacts(self) -> None:

@@ -27,6 +27,7 @@ from kmn_skill.planning.layout import BASE_POSITION, HANDLE
 from kmn_skill.planning.plan import Plan
 
 PATH_WIDTH = 0.02  # metres
+HANDLES = ("", "lever")  # kinds that the policy can turn; models of one kind do not name it
 BASE_COLOUR = ColorRGBA(r=0.36, g=0.61, b=0.94, a=1.0)
 HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
 DOOR_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=0.3)
@@ -38,7 +39,6 @@ def observation_from_message(message: MorphingParameters) -> DoorObservation:
     covariance = np.array(message.covariance, dtype=np.float64)
     if covariance.size == values.size**2:
         covariance = covariance.reshape(values.size, values.size)
-    valid = message.status == MorphingParameters.OK
     return DoorObservation(
         time=seconds(message.header.stamp),
         model=message.model,
@@ -46,8 +46,19 @@ def observation_from_message(message: MorphingParameters) -> DoorObservation:
         names=(*message.theta_names, *message.gamma_names),
         values=values,
         covariance=covariance,
-        problem="" if valid else message.reason or f"status is {message.status}, expected OK",
+        problem=_problem(message),
     )
+
+
+def _problem(message: MorphingParameters) -> str:
+    """Return why the door of a message cannot be relied on, or not be opened, or nothing."""
+    if message.status != MorphingParameters.OK:
+        return message.reason or f"status is {message.status}, expected OK"
+    if message.mirrored:
+        return "the door is mirrored: its handle is at the left, expected at the right"
+    if message.alternative not in HANDLES:
+        return f"the handle is a {message.alternative}, expected a lever"
+    return ""
 
 
 def sample_from_state(message: JointState, names: Sequence[str]) -> Sample:

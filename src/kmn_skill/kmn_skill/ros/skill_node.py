@@ -77,6 +77,7 @@ class SkillNode(Node):
             PerceivedDoor(settings.model, settings.world_frame, settings.door),
             DoorMemory(),
             StateWatch(settings.states, self._joints),
+            setup.settings.surroundings,
         )
         self._ending = ExitStack()
         planner = Planner(setup, Prototypes.load(), settings.planning_time)
@@ -170,7 +171,7 @@ class SkillNode(Node):
             self._refuse(topic, f"{topic}_{error.reason}", error)
             return
         self._refusals.clear(topic)
-        _, door, memory, watch = self._knowledge
+        _, door, memory, watch, _ = self._knowledge
         breaks = watch.breaks
         watch.put(topic, sample)
         if watch.breaks != breaks:

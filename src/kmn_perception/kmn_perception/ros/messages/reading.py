@@ -67,7 +67,7 @@ def view_from_image(
             "same size: the camera_info is of another resolution or of another camera",
         )
     if rectify_depth and is_distorted(info):
-        depth = rectify(depth, _distortion(info), camera)
+        depth = rectify(depth, distortion_from_info(info), camera)
         if not np.isfinite(depth).any():
             raise MessageError("no_finite_points", "no pixel is left of the rectified depth image")
     view = DepthView.of_depth(depth, camera)
@@ -131,8 +131,8 @@ def depth_from_image(image: Image, max_range: float) -> NDArray[np.float32]:
             "'32FC1' (metres) or '16UC1' (millimetres)",
         )
     dtype = np.dtype(DEPTH_TYPES[image.encoding]).newbyteorder(">" if image.is_bigendian else "<")
-    _check_rows("depth image", "step", image.step, image.width * dtype.itemsize)
-    _check_length("depth image", image.data, image.step, image.height)
+    check_rows("depth image", "step", image.step, image.width * dtype.itemsize)
+    check_length("depth image", image.data, image.step, image.height)
     raw: NDArray[np.generic] = np.ndarray(
         (image.height, image.width), dtype, image.data, strides=(image.step, dtype.itemsize)
     )
@@ -193,7 +193,7 @@ def camera_from_info(info: CameraInfo) -> Camera:
     )
 
 
-def _distortion(info: CameraInfo) -> Distortion:
+def distortion_from_info(info: CameraInfo) -> Distortion:
     """Read the distortion of a raw image, for the region of interest and binning that it has.
 
     Raises
@@ -241,18 +241,20 @@ def _check_layout(cloud: PointCloud2, fields: dict[str, PointField]) -> None:
                 f"the cloud's field {name} ends at byte {end} of a point, "
                 f"but point_step is {cloud.point_step}",
             )
-    _check_rows("cloud", "row_step", cloud.row_step, cloud.width * cloud.point_step)
-    _check_length("cloud", cloud.data, cloud.row_step, cloud.height)
+    check_rows("cloud", "row_step", cloud.row_step, cloud.width * cloud.point_step)
+    check_length("cloud", cloud.data, cloud.row_step, cloud.height)
 
 
-def _check_rows(what: str, name: str, step: int, row_length: int) -> None:
+def check_rows(what: str, name: str, step: int, row_length: int) -> None:
+    """Raise if the bytes from row to row are fewer than those of a row."""
     if step < row_length:
         raise MessageError(
             "row_step", f"the {what}'s {name} is {step}, expected {row_length} bytes or more"
         )
 
 
-def _check_length(what: str, data: array.array[int], step: int, height: int) -> None:
+def check_length(what: str, data: array.array[int], step: int, height: int) -> None:
+    """Raise if there are not as many bytes as rows need."""
     if len(data) != step * height:
         reason = "truncated" if len(data) < step * height else "excess_data"
         raise MessageError(

@@ -54,26 +54,39 @@ def parameters_from_estimate(
         residual=float(estimate.residual),
         points_used=estimate.points_used,
         status=int(estimate.status),
+        alternative=estimate.alternative,
+        mirrored=estimate.mirrored,
+        joint_names=[joint.name for joint in estimate.joints],
+        joint_positions=[joint.value for joint in estimate.joints],
+        joint_deviations=[joint.deviation for joint in estimate.joints],
+        surroundings_names=[around.name for around in estimate.surroundings],
+        surroundings=[around.value for around in estimate.surroundings],
+        surroundings_deviations=[around.deviation for around in estimate.surroundings],
         reason=estimate.reason,
     )
 
 
 def markers_from_estimates(
-    model: KinematicModel, estimates: Sequence[Estimate], header: Header
+    name: str, objects: Sequence[tuple[Estimate, NDArray[np.float64]]], header: Header
 ) -> MarkerArray:
     """Draw the bodies of the estimated models as cubes, which replace the former ones.
 
-    They are green where the estimate is valid, else red; without an object there are none, and
-    none of a body without a size.
+    They are green where the parameters hold, else red; there is none of a body without a size.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    objects
+        For each object its estimate and its bodies (B, 4, 4), see `KinematicModel.unit_cubes`.
     """
-    markers = [Marker(header=header, ns=model.name, action=Marker.DELETEALL)]
-    for estimate in estimates:
-        if np.isfinite(estimate.theta).all() and np.isfinite(estimate.gamma).all():
-            colour = INVALID_COLOUR if estimate.reason else VALID_COLOUR
-            for cube in model.unit_cubes(estimate.theta, estimate.gamma):
-                if not cube[:3, :3].any(axis=0).all():
-                    continue
-                markers.append(cube_marker(model.name, len(markers) - 1, cube, colour, header))
+    markers = [Marker(header=header, ns=name, action=Marker.DELETEALL)]
+    for estimate, cubes in objects:
+        holds = estimate.status in (MorphingParameters.OK, MorphingParameters.HANDLE_NOT_SEEN)
+        colour = VALID_COLOUR if holds else INVALID_COLOUR
+        for cube in cubes:
+            if cube[:3, :3].any(axis=0).all():
+                markers.append(cube_marker(name, len(markers) - 1, cube, colour, header))
     return MarkerArray(markers=markers)
 
 

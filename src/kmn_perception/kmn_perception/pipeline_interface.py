@@ -1,0 +1,99 @@
+"""What morph_node asks of a pipeline, be it that of single objects or that of doors in walls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_perception.estimator import Estimate, EstimatorSettings
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.scene.camera_pose import CameraPose
+from kmn_perception.scene.depth_view import DepthView
+from kmn_perception.scene.segmentation import SegmentationSettings
+from kmn_perception.scene.settings import SceneSettings
+from kmn_perception.scene.support_plane import SupportPlaneSettings
+
+
+class CalibrationState(Enum):
+    """What was done about a depth camera's calibration: that of its maker, or the user's own."""
+
+    DELIVERED = "delivered"
+    CALIBRATED = "calibrated"
+
+
+@dataclass(frozen=True, eq=False)
+class PipelineSettings:
+    """How a frame becomes objects in the world frame.
+
+    Attributes
+    ----------
+    camera_pose
+        The model's canonical one, the given one, or estimated from the support plane.
+    given_pose
+        (4, 4) optical frame in the world frame, metres.
+    plane
+        What counts as a support plane.
+    background
+        The stages of the background removal.
+    scene
+        How objects are told apart.
+    calibration
+        Of the depth camera; counts for doors in walls.
+    """
+
+    camera_pose: CameraPose
+    given_pose: NDArray[np.float64]
+    plane: SupportPlaneSettings
+    background: SegmentationSettings
+    scene: SceneSettings
+    calibration: CalibrationState
+
+
+class ObjectEstimate(NamedTuple):
+    """An estimate with what it rests on.
+
+    Attributes
+    ----------
+    estimate
+        Morphing parameters, or why there are none.
+    observation
+        The object's points, in the world frame, and what is known around them.
+    mask
+        (height, width), or (N,) for unorganised points: which ones they are.
+    truncated
+        The object goes on where nothing is seen: beyond the image's border.
+    """
+
+    estimate: Estimate
+    observation: Observation
+    mask: NDArray[np.bool_]
+    truncated: bool
+
+
+class Pipeline(Protocol):
+    """From a frame to estimates of one model, as morph_node needs it."""
+
+    @property
+    def model(self) -> KinematicModel:
+        """What is estimated."""
+
+    @property
+    def uses_image(self) -> bool:
+        """Whether a view's grey values tell anything."""
+
+    def warm_up(self) -> None:
+        """Compile and load all that the first estimate needs, so that it is not slow."""
+
+    def estimate_all(self, view: DepthView, max_objects: int | None = None) -> list[ObjectEstimate]:
+        """Estimate ``max_objects`` or all objects; where there is none, a single one says why."""
+
+    def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) to draw, none without an estimate; see `unit_cubes`."""
+
+    def configured(self, settings: PipelineSettings, estimator: EstimatorSettings) -> Pipeline:
+        """Return the pipeline with other settings, which shares what was loaded."""

@@ -1,0 +1,44 @@
+"""Settings of what an observation must show of a fit, a part of ``config/refinement.yaml``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from kmn_perception.configuration.settings import Count, Fraction, NonNegative, Positive
+
+
+class SupportSettings(NamedTuple):
+    """What an observation must show of a fit.
+
+    Attributes
+    ----------
+    averaged
+        Fraction of the shorter side of a body that stands before others, such as a handle, over
+        which depths are averaged.
+    distinct
+        Averaged depths that differ by more show something else, as a fraction of how far the body
+        stands out.
+    max_missing
+        Maximum fraction of its pixels that may show what is behind it.
+    max_unexplained
+        What stands out beside it may cover this multiple of its area at most.
+    min_pixels
+        A body that covers fewer is not judged.
+    relief
+        The surface may be higher or deeper than the model by this, averaged over a square of
+        ``relief_radius`` pixels to each side, metres.
+    max_relief
+        Maximum fraction of its pixels where it is more than that.
+    something_else
+        What lies farther before (or behind) the model than this is something else, metres.
+    """
+
+    averaged: Fraction
+    distinct: Fraction
+    max_missing: Fraction
+    max_unexplained: NonNegative
+    min_pixels: Count
+    relief: Positive
+    relief_radius: Count
+    max_relief: Fraction
+    something_else: Positive

@@ -1,0 +1,30 @@
+"""Only doors that the policy can open come through, whatever their messages say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from kmn_msgs.msg import MorphingParameters
+from kmn_skill.ros.messages import observation_from_message
+
+
+def problem(**fields: Any) -> str:
+    return observation_from_message(MorphingParameters(**fields)).problem
+
+
+@pytest.mark.parametrize("kind", ["", "lever"])
+def test_a_door_with_a_lever_at_the_right_is_taken(kind: str) -> None:
+    assert problem(status=MorphingParameters.OK, alternative=kind) == ""
+
+
+@pytest.mark.parametrize("status", [*range(1, 7), 255])
+def test_whatever_is_not_ok_is_refused(status: int) -> None:
+    assert problem(status=status, reason="too dark") == "too dark"
+    assert str(status) in problem(status=status)
+
+
+def test_a_mirrored_door_and_other_handles_are_refused_with_the_reason() -> None:
+    assert "handle is at the left" in problem(alternative="lever", mirrored=True)
+    assert "the handle is a knob" in problem(alternative="knob")

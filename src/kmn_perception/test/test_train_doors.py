@@ -228,7 +228,7 @@ def test_what_is_outside_of_a_window_is_not_to_be_found_there() -> None:
     assert soft.handle_known[0] == 0.0
     inside = soft_targets([Target(1.0, 2.0, 20.0, 11.0, 30.0, 17.0, 2.0)], 40, spread)
     place = inside.handle[0, :-1].reshape(3, ROWS, 40)
-    assert np.unravel_index(int(place.argmax()), place.shape) == (2, 30, 17)
+    np.testing.assert_array_equal(np.unravel_index(int(place.argmax()), place.shape), (2, 30, 17))
     for answer in (inside.edges[0, 0], inside.edges[0, 1], inside.top[0], inside.handle[0]):
         assert float(answer.sum()) == pytest.approx(1.0, abs=1e-5)
     missing = soft_targets([Target(0.0)], 40, spread)

@@ -1,4 +1,5 @@
-"""The offline training tool: Algorithm 2 of the paper, and the training of our network by stages.
+"""The offline training tools: Algorithm 2 of the paper, training by stages, and training on walls.
 
-Imports ``network``, ``scene``, ``model``, ``configuration`` and ``command_line``.
+Imports ``doors``, ``rooms``, ``network``, ``scene``, ``model``, ``configuration`` and
+``command_line``.
 """

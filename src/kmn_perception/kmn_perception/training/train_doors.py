@@ -17,6 +17,7 @@ from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.network import wall_weights
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.wall_network import WallNetwork
 from kmn_perception.rooms.settings import RoomSettings
 from kmn_perception.training.run import Run, RunError
@@ -39,9 +40,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--rooms", type=whole_number(2), help="in place of the settings'")
     parser.add_argument("--epochs", type=positive, help="in place of the settings'")
     parser.add_argument("--seed", type=whole_number(0), help="in place of the settings'")
-    parser.add_argument(
-        "--processes", type=positive, default=1, help="that render, then threads of torch"
-    )
+    parser.add_argument("--processes", type=positive, default=1, help="that render (default 1)")
     parser.add_argument(
         "--run", type=output_folder, help="folder of the run (default: beside --out)"
     )
@@ -78,7 +77,7 @@ def train(options: argparse.Namespace) -> None:
     )
     samples, held_out = read_shards(files, settings)
     print(f"{len(samples)} views to train on, {len(held_out)} held out; the run: {folder}")
-    torch.set_num_threads(options.processes)
+    use_one_thread()
     torch.manual_seed(settings.seed)
     network = WallNetwork(settings.width)
     high, wide = (cells["pixel"] * count for count in cells["pixels"])

@@ -62,7 +62,8 @@ class Fitting:
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
             self._optimiser,
             fit.learning_rate,
-            total_steps=max(fit.epochs * self._steps, 2),
+            # Of fewer steps the rise would have no length.
+            total_steps=max(fit.epochs * self._steps, math.ceil(2.0 / fit.warm_up)),
             pct_start=fit.warm_up,
         )
 

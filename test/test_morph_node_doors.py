@@ -109,11 +109,18 @@ def test_an_open_door_without_its_handle_has_no_known_hinge(talk: DoorTalk) -> N
     assert answer.reason
 
 
-@pytest.mark.parametrize("handle", ["none", "bar"])
-def test_no_handle_is_invented(talk: DoorTalk, handle: str) -> None:
-    answer = talk.ask_grey(see_door(recess=0.0, handle=handle))
+def test_no_handle_is_invented(talk: DoorTalk) -> None:
+    answer = talk.ask_grey(see_door(recess=0.0, handle="none"))
     assert answer.status != MorphingParameters.OK
     assert answer.alternative == ""
+
+
+def test_a_vertical_bar_is_no_lever(talk: DoorTalk) -> None:
+    seen = see_door(recess=0.0, handle="bar")
+    answer = talk.ask_grey(seen)
+    assert answer.alternative in ("", "bar")
+    if answer.status == MorphingParameters.OK:
+        assert_true(answer, seen.door)
 
 
 def test_a_kind_that_the_model_does_not_know_is_named(

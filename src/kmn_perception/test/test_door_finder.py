@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def finder() -> DoorFinder:
     return DoorFinder.load()
 
 
-def settings(**door: object) -> RoomSettings:
+def settings(**door: Any) -> RoomSettings:
     """Return clear rooms, with a door as it is said, seen from where it is easy to see."""
     shipped = RoomSettings.load()
     where: CameraSettings = shipped.camera._replace(
@@ -38,7 +39,7 @@ def settings(**door: object) -> RoomSettings:
         roll=(-0.03, 0.03),
         both_edges=1.0,
     )
-    plain = {
+    plain: dict[str, Any] = {
         "closed": 1.0, "frame": 0.0, "flush": 0.0, "handle": {"lever": 1.0},
         "fitting": {"rosette": 1.0},
     }  # fmt: skip
@@ -79,10 +80,10 @@ def check(found: DoorEstimate, room: Room) -> None:
         slack = DEVIATIONS * np.hypot(found.deviation(name), 0.003)
         assert abs(found.value(name) - value) < slack, (name, found.value(name), value, slack)
     normal = np.linalg.inv(room.camera.pose)[:3, :3] @ -door.frame[:3, 0]
-    assert np.degrees(np.arccos(min(1.0, found.normal @ normal))) < 3.0
+    assert np.degrees(np.arccos(np.clip(found.normal @ normal, -1.0, 1.0))) < 3.0
 
 
-CONDITIONS = {
+CONDITIONS: dict[str, dict[str, Any]] = {
     "recessed": {},
     "flush": {"flush": 1.0},
     "in a frame": {"frame": 1.0},

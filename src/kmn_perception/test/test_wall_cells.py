@@ -28,9 +28,8 @@ RIGHT, DOWN, OFFSET, MEASURED, INSIDE, FRONT = range(6)
 def blank(columns: int = 200) -> WallView:
     """Return the view of a grey wall, 2 m away."""
     x, y, z = np.eye(3)
-    s = (PIXEL * np.arange(columns)).astype(np.float64)
-    high, low = DOORS.view.heights[::-1]
-    heights = np.arange(high, low, -PIXEL).astype(np.float64)
+    s = np.asarray(PIXEL * np.arange(columns), dtype=np.float64)
+    heights = np.arange(*DOORS.view.heights[::-1], -PIXEL, dtype=np.float64)
     shape = (len(heights), columns)
     return WallView(
         frame=WallFrame(-z, x, -y, 2.0, 1.0),
@@ -86,8 +85,8 @@ def test_a_mirrored_view_has_mirrored_cells_of_the_other_sign() -> None:
     view, generator = blank(), np.random.default_rng(0)
     assert view.grey is not None
     noise = generator.standard_normal(view.grey.shape).astype(np.float32)
-    grey: NDArray[np.float32] = cv2.GaussianBlur(noise, (0, 0), 3.0).astype(np.float32)
-    offset: NDArray[np.float32] = (grey * NOISE).astype(np.float32)
+    grey = np.asarray(cv2.GaussianBlur(noise, (0, 0), 3.0), dtype=np.float32)
+    offset = (grey * NOISE).astype(np.float32)
     there = cells(replace(view, grey=grey, offset=offset))
     back = cells(replace(view, grey=grey[:, ::-1].copy(), offset=offset[:, ::-1].copy()))
     np.testing.assert_allclose(back[DOWN], there[DOWN, :, ::-1], atol=1e-5)

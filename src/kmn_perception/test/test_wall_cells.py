@@ -98,7 +98,7 @@ def test_a_mirrored_view_has_mirrored_cells_of_the_other_sign() -> None:
 def doors() -> list[tuple[Frame, WallView]]:
     """Return rendered doors, and the views of their walls where these truly are."""
     found = []
-    for seed in range(8):
+    for seed in (1, 2, 3, 11, 15, 21, 25, 29):  # flush, and from 11 on recessed
         frame = make_frame(seed, "none")
         to_camera = frame.room.camera.world_to_camera[:3, :3]
         normal = -to_camera @ frame.room.wall[:3, 0]
@@ -121,6 +121,7 @@ def test_targets_are_where_the_camera_sees_the_doors_edges(
 ) -> None:
     """A cell's place on the wall, projected by the camera, is the pixel of the corner itself."""
     compared = 0
+    flush = 0
     for frame, view in doors:
         target, door, camera = found_target(frame, view), frame.room.door, frame.room.camera
         assert door is not None
@@ -140,9 +141,12 @@ def test_targets_are_where_the_camera_sees_the_doors_edges(
             up = float(edge @ view.frame.up) + view.frame.height
             at = camera.matrix @ view.frame.points(np.array(s), np.array(up))
             cell = WIDE * camera.fx / at[2]
-            assert low - cell <= at[0] / at[2] <= high + cell
+            off = float(max(low - at[0] / at[2], at[0] / at[2] - high)) / cell
+            assert off < 0.25
+            flush += recess < 0.005
             compared += 1
     assert compared >= 6
+    assert flush >= 3  # where frame and panel are one
 
 
 def test_tops_and_handles_of_doors_in_the_walls_plane_have_their_heights(

@@ -166,7 +166,7 @@ def edge_spread(candidate: Candidate, side: str, settings: DoorSettings) -> floa
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
         if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
-            weights.append(min(line.contrast, 1.0) ** 2 * _probability(candidate, side, line))
+            weights.append((min(line.contrast, 1.0) * _probability(candidate, side, line)) ** 2)
             offsets.append(offset)
     if not sum(weights):
         return 0.0

@@ -114,7 +114,6 @@ def score_of(
     )
     edge = round(0.3 * reach)
     panel = slice(first + edge, last - edge)
-    body = pieces.body
     contrast = sum(min(line.contrast, weight.max_contrast) for line in (left, right))
     # A recess: nearer outside, at both edges.
     step = float(np.clip(min(left.step, -right.step) / settings.lines.min_step, 0.0, 2.0))
@@ -125,7 +124,7 @@ def score_of(
         + weight.contrast * contrast
         + weight.step * step
         - weight.inner_line * inner
-        - weight.hollow * float(pieces.hollow[body][:, panel].mean())
-        - weight.hidden * float(pieces.hidden[body][:, panel].mean())
+        - weight.hollow * float(pieces.hollow[panel].mean())
+        - weight.hidden * float(pieces.hidden[panel].mean())
         - weight.width * abs(width - weight.expected_width)
     )

@@ -51,7 +51,8 @@ class Pieces:
     known
         (K, columns) pieces that are mostly in view and unhidden.
     hidden, hollow
-        (K, columns) shares of them that something hides, and where nothing is for long behind.
+        (columns,) shares of a door's height that something hides, and where nothing is for long
+        behind.
     body
         (K,) pieces within the heights where any door has its edges.
     step
@@ -102,8 +103,8 @@ def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSe
             number > 0.5 * full, _sums(sharp, rows, count) / np.maximum(number, 1.0), 0.0
         ).astype(np.float32),
         known=number > 0.5 * full,
-        hidden=_sums(hides & view.inside, rows, count) / area,
-        hollow=_sums(hollow & view.inside, rows, count) / area,
+        hidden=(_sums(hides & view.inside, rows, count) / area)[body].mean(axis=0),
+        hollow=(_sums(hollow & view.inside, rows, count) / area)[body].mean(axis=0),
         body=body,
         step=_steps(view, usable & ~hollow, rows, body, settings),
         sharp=sharp,

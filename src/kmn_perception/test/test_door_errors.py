@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.geometry import DOOR, View2d, door_shape, door_values
-from kmn_perception.experiments.doors.errors import UNITS, DoorErrors, door_place, errors
-from kmn_perception.experiments.doors.label import DoorLabel, Edge, Known
-from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.evaluation.doors.errors import UNITS, DoorErrors, door_place, errors
+from kmn_perception.evaluation.doors.label import DoorLabel, Edge, Known
+from kmn_perception.evaluation.doors.settings import DoorErrorSettings
 from kmn_perception.model.room_model import RoomModel
 
-SETTINGS = ExperimentSettings.load().doors
+SETTINGS = DoorErrorSettings.load()
 MODEL = RoomModel.load("room_door")
 HEIGHT = 1.2  # of the camera, metres, which looks along x
 POSE = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, HEIGHT], [0, 0, 0, 1]], dtype=float)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.geometry import DOOR, HEIGHT, WIDTH, propagate
-from kmn_perception.experiments.doors.label import DoorLabel, Edge
-from kmn_perception.experiments.settings import DoorExperimentSettings
+from kmn_perception.evaluation.doors.label import DoorLabel, Edge
+from kmn_perception.evaluation.doors.settings import DoorErrorSettings
 from kmn_perception.model.room_model import RoomModel
 
 MM = 1e3  # in a metre
@@ -72,7 +72,7 @@ class DoorErrors(NamedTuple):
         with np.errstate(divide="ignore", invalid="ignore"):  # what is stated to be exact
             return np.abs(self.values) / self.deviations
 
-    def is_wrong(self, settings: DoorExperimentSettings) -> bool:
+    def is_wrong(self, settings: DoorErrorSettings) -> bool:
         """Return whether a promise is broken, or the door is not where it is said to be."""
         edge = bool((np.abs(self.values[EDGES]) > MM * settings.wrong_edge).any())
         yaw = bool(abs(self.values[YAW]) > settings.wrong_yaw)
@@ -80,7 +80,7 @@ class DoorErrors(NamedTuple):
 
 
 def errors(
-    estimate: DoorEstimate, label: DoorLabel, model: RoomModel, settings: DoorExperimentSettings
+    estimate: DoorEstimate, label: DoorLabel, model: RoomModel, settings: DoorErrorSettings
 ) -> DoorErrors:
     """Compare an estimate with a label; deviations follow from its covariance by derivatives."""
 
@@ -171,7 +171,7 @@ def _across(ends: NDArray[np.float64], edge: Edge | None, label: DoorLabel) -> f
     return float(((ends - feet) @ label.right).mean())
 
 
-def label_deviations(label: DoorLabel, settings: DoorExperimentSettings) -> NDArray[np.float64]:
+def label_deviations(label: DoorLabel, settings: DoorErrorSettings) -> NDArray[np.float64]:
     """Return the standard deviations (Q,) of the label, in the units of ``UNITS``."""
     handle = [
         MM * float(np.linalg.norm(label.handle_deviation * axis))

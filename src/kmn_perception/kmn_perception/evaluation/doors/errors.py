@@ -72,11 +72,18 @@ class DoorErrors(NamedTuple):
         with np.errstate(divide="ignore", invalid="ignore"):  # what is stated to be exact
             return np.abs(self.values) / self.deviations
 
+    def is_far_off(self, settings: DoorErrorSettings) -> bool:
+        """Return whether the door is not where it is said to be."""
+        edge = bool((np.abs(self.values[EDGES]) > MM * settings.wrong_edge).any())
+        return edge or bool(abs(self.values[YAW]) > settings.wrong_yaw)
+
+    def breaks_promise(self, settings: DoorErrorSettings) -> bool:
+        """Return whether an error is larger than its deviation allows."""
+        return bool((self.ratios > settings.wrong_deviations).any())
+
     def is_wrong(self, settings: DoorErrorSettings) -> bool:
         """Return whether a promise is broken, or the door is not where it is said to be."""
-        edge = bool((np.abs(self.values[EDGES]) > MM * settings.wrong_edge).any())
-        yaw = bool(abs(self.values[YAW]) > settings.wrong_yaw)
-        return edge or yaw or bool((self.ratios > settings.wrong_deviations).any())
+        return self.is_far_off(settings) or self.breaks_promise(settings)
 
 
 def errors(

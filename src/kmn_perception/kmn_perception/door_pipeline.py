@@ -22,7 +22,7 @@ from kmn_perception.model.rendering import render
 from kmn_perception.model.room_model import HINGE, OPENING, RoomModel
 from kmn_perception.model.surface_distance import surface_distances
 from kmn_perception.model.transformation import transform_points
-from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
+from kmn_perception.pipeline_interface import CalibrationState, ObjectEstimate, PipelineSettings
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.depth_view import DepthView
 
@@ -50,8 +50,10 @@ class DoorPipeline:
         self.room, self.finder, self.settings = room, finder, settings
 
     @classmethod
-    def load(cls, model: str | Path, settings: PipelineSettings) -> DoorPipeline:
-        """Load a model with surroundings.
+    def load(
+        cls, model: str | Path, weights_file: str | Path, settings: PipelineSettings
+    ) -> DoorPipeline:
+        """Load a model with surroundings, and its network, see `DoorFinder.load`.
 
         Raises
         ------
@@ -59,6 +61,8 @@ class DoorPipeline:
             If a file is missing or wrong.
         ValueError
             If the model has other parameters than those that are found.
+        WeightsError
+            If the weights are missing, corrupt, or of another network.
         """
         room = RoomModel.load(model)
         names = tuple(parameter.name for parameter in room.model.parameters)
@@ -67,7 +71,7 @@ class DoorPipeline:
                 f"model '{model}' has the parameters {', '.join(names)}, expected "
                 f"{', '.join(DOOR[:7])}, as a door in a wall is found by"
             )
-        return cls(room, DoorFinder(DoorSettings.load()), settings)
+        return cls(room, _calibrated(DoorFinder.load(weights_file), settings), settings)
 
     @property
     def model(self) -> KinematicModel:
@@ -81,7 +85,7 @@ class DoorPipeline:
 
     def configured(self, settings: PipelineSettings, estimator: EstimatorSettings) -> DoorPipeline:
         """Return the pipeline with other settings, which shares model and finder."""
-        return DoorPipeline(self.room, self.finder, settings)
+        return DoorPipeline(self.room, _calibrated(self.finder, settings), settings)
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
@@ -175,8 +179,7 @@ class DoorPipeline:
         values, covariance = _move(found, camera.pose)
         theta, gamma = self.model.split(values)
         side = found.handle_side or "right"
-        # The finder's opening turns to the right as seen; the model's, away from us.
-        opening = found.value(OPENING) * (1.0 if side == "left" else -1.0)
+        opening = found.value(OPENING)
         deviation = max(found.deviation(OPENING), self.finder.settings.fit.closed)
         is_open = abs(opening) > SIGNIFICANT * deviation
         status, reason = self._verdict(found, is_open)
@@ -208,6 +211,13 @@ class DoorPipeline:
             distances = surface_distances(self.bodies(estimate), points)
             estimate = replace(estimate, residual=float(np.median(distances)))
         return ObjectEstimate(estimate, Observation(points, camera), mask, truncated)
+
+
+def _calibrated(finder: DoorFinder, settings: PipelineSettings) -> DoorFinder:
+    """Return the finder for a sensor as well calibrated as the settings say."""
+    shipped = DoorSettings.load()
+    delivered = settings.calibration is CalibrationState.DELIVERED
+    return finder.with_calibration(shipped.delivered if delivered else shipped.calibration)
 
 
 def _value(quantities: tuple[Quantity, ...], name: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +17,13 @@ from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.segmentation import SegmentationSettings
 from kmn_perception.scene.settings import SceneSettings
 from kmn_perception.scene.support_plane import SupportPlaneSettings
+
+
+class CalibrationState(Enum):
+    """What was done about a depth camera's calibration: that of its maker, or the user's own."""
+
+    DELIVERED = "delivered"
+    CALIBRATED = "calibrated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +42,8 @@ class PipelineSettings:
         The stages of the background removal.
     scene
         How objects are told apart.
+    calibration
+        Of the depth camera; counts for doors in walls.
     """
 
     camera_pose: CameraPose
@@ -41,6 +51,7 @@ class PipelineSettings:
     plane: SupportPlaneSettings
     background: SegmentationSettings
     scene: SceneSettings
+    calibration: CalibrationState
 
 
 class ObjectEstimate(NamedTuple):

@@ -60,15 +60,17 @@ def test_a_closed_flush_door_seen_squarely_has_its_own_numbers() -> None:
 
 @pytest.mark.parametrize("opening", [-0.3, 0.1, 0.4])
 def test_an_open_door_keeps_the_place_that_it_has_when_it_is_closed(opening: float) -> None:
-    hinge, width = np.array([-0.45, 2.2]), 0.85
-    closed = hinge + np.array([width, 0.0])
-    turned = hinge + width * np.array([np.cos(opening), np.sin(opening)])
-    wall = line_through(hinge, closed)
-    grip = handle_before(hinge, turned, 0.1)
-    m = measured(hinge, turned, wall, 1.3, np.array([*grip, 1.0 - 1.3]))
+    left, width = np.array([-0.45, 2.2]), 0.85
+    right = left + np.array([width, 0.0])
+    axis = left + np.array([0.0, 0.019])  # of the hinge, in the panel's middle plane
+    turn = np.array([[np.cos(opening), -np.sin(opening)], [np.sin(opening), np.cos(opening)]])
+    seen_left, seen_right = (axis + turn @ (corner - axis) for corner in (left, right))
+    grip = handle_before(seen_left, seen_right, 0.1)
+    wall = line_through(left, right)
+    m = measured(seen_left, seen_right, wall, 1.3, np.array([*grip, 1.0 - 1.3]))
     values = dict(zip(DOOR, door_values(m, False, True, SQUARE), strict=True))
     assert values["door_width"] == pytest.approx(width - 0.8)
-    assert abs(values["opening"]) == pytest.approx(abs(opening))
+    assert values["opening"] == pytest.approx(opening)  # away from the camera
     assert values["yaw"] == pytest.approx(0.0, abs=1e-12)
     assert values["y"] == pytest.approx(0.45 - width / 2.0)
     assert values["x"] == pytest.approx(2.2 + 0.019)

@@ -80,9 +80,10 @@ def test_the_statistics_have_their_keys(run: Run) -> None:
     result = run.result
     assert [key for key in result if key in BLOCK] == [*BLOCK]
     assert set(result) - set(BLOCK) == {
-        "negatives", "negatives_ok", "baselines", "depth_alone", "per_frame",
+        "negatives", "negatives_ok", "baselines", "depth_alone", "without_network", "per_frame",
     }  # fmt: skip
-    assert set(result["depth_alone"]) == {*BLOCK, "negatives", "negatives_ok"}
+    for mode in ("depth_alone", "without_network"):
+        assert set(result[mode]) == {*BLOCK, "negatives", "negatives_ok"}
     assert set(result["baselines"]) == {"depth_steps", "grey_lines", "masked_pipeline"}
     for key in BLOCK[3:10]:
         assert set(result[key]) == {"median", "p95"}
@@ -114,7 +115,7 @@ def test_quantiles_are_those_of_the_frames(run: Run) -> None:
 def test_every_frame_is_printed_and_drawn(run: Run) -> None:
     lines = run.printed.splitlines()
     for name in (*DOORS, NEGATIVE):
-        assert sum(line.startswith(name) for line in lines) == 2  # with colour and without
+        assert sum(line.startswith(name) for line in lines) == 3  # with and without network, colour
     reason = run.result["per_frame"][NEGATIVE][WITH_COLOUR]["reason"]
     assert any(line.startswith(NEGATIVE) and line.endswith(reason) for line in lines)
     names = {path.name for path in run.pictures.iterdir()}

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from kmn_perception.estimator import Status
 from kmn_perception.model.rendering import render
 from kmn_perception.model.sensor_noise import add_noise
-from kmn_perception.pipeline import MorphPipeline, ObjectEstimate
+from kmn_perception.pipeline import MorphPipeline
+from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import cuboid, shipped_pipeline

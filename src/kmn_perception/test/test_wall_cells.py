@@ -28,8 +28,8 @@ RIGHT, DOWN, OFFSET, MEASURED, INSIDE, FRONT = range(6)
 def blank(columns: int = 200) -> WallView:
     """Return the view of a grey wall, 2 m away."""
     x, y, z = np.eye(3)
-    s = PIXEL * np.arange(columns)
-    heights = np.arange(DOORS.view.heights[1], DOORS.view.heights[0], -PIXEL)
+    s = np.asarray(PIXEL * np.arange(columns), dtype=np.float64)
+    heights = np.arange(*DOORS.view.heights[::-1], -PIXEL, dtype=np.float64)
     shape = (len(heights), columns)
     return WallView(
         frame=WallFrame(-z, x, -y, 2.0, 1.0),
@@ -85,7 +85,7 @@ def test_a_mirrored_view_has_mirrored_cells_of_the_other_sign() -> None:
     view, generator = blank(), np.random.default_rng(0)
     assert view.grey is not None
     noise = generator.standard_normal(view.grey.shape).astype(np.float32)
-    grey = cv2.GaussianBlur(noise, (0, 0), 3.0)
+    grey = np.asarray(cv2.GaussianBlur(noise, (0, 0), 3.0), dtype=np.float32)
     offset = (grey * NOISE).astype(np.float32)
     there = cells(replace(view, grey=grey, offset=offset))
     back = cells(replace(view, grey=grey[:, ::-1].copy(), offset=offset[:, ::-1].copy()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.proposals import with_proposals
-from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.settings import Calibration, DoorSettings
 from kmn_perception.doors.verdict import judge
+from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.doors.wall_view import WallView
 from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
+from kmn_perception.network import wall_weights
 from kmn_perception.network.wall_network import WallNetwork
 
 
@@ -32,6 +35,26 @@ class DoorFinder:
         self, settings: DoorSettings, network: WallNetwork | None = None, seed: int = 0
     ) -> None:
         self.settings, self.network, self.seed = settings, network, seed
+
+    @classmethod
+    def load(cls, weights_file: str | Path = "") -> DoorFinder:
+        """Load the settings and a network; an empty ``weights_file`` means the shipped one.
+
+        Raises
+        ------
+        FileNotFoundError, ConfigurationError
+            If the settings are missing or wrong.
+        WeightsError
+            If the weights are missing, corrupt, or of another network.
+        """
+        settings = DoorSettings.load()
+        weights = wall_weights.load(weights_file or wall_weights.MODEL, describe_cells(settings))
+        return cls(settings, weights.network)
+
+    def with_calibration(self, calibration: Calibration) -> DoorFinder:
+        """Return the finder for a sensor that is calibrated so well."""
+        settings = replace(self.settings, calibration=calibration)
+        return DoorFinder(settings, self.network, self.seed)
 
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""

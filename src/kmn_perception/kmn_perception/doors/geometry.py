@@ -23,7 +23,8 @@ MEASURED = (
     "protrusion",                 # of the handle's middle before the panel, metres
 )  # fmt: skip
 # What follows. Metres and radians; the world's origin lies on the floor below the camera, x points
-# where the camera looks, z up. `x`, `y`, `yaw` are those of the closed door, see the model.
+# where the camera looks, z up. `x`, `y`, `yaw` are those of the closed door, and `opening` is
+# positive away from the camera, see the model.
 DOOR = (
     "x", "y", "yaw", "door_height", "door_width", "handle_y", "handle_z", "opening", "recess",
 )  # fmt: skip
@@ -95,7 +96,8 @@ def door_values(
     axis = m[0:2] / np.linalg.norm(m[0:2]) if ajar else m[2:4] / np.linalg.norm(m[2:4])
     across = np.array([axis[1], -axis[0]])  # along the wall, to the right
     middle = hinge + across * (-0.5 if handle_left else 0.5) * width
-    middle = middle + axis * PANEL_FRONT
+    panel = m[2:4] / np.linalg.norm(m[2:4])
+    middle = middle + panel * PANEL_FRONT  # it turns about a point of its middle plane
     x, y = look.to_world(middle)
     heading = look.to_world(axis)
     yaw = np.arctan2(heading[1], heading[0])
@@ -110,7 +112,7 @@ def door_values(
             width - WIDTH,
             inset - HANDLE_INSET,
             handle_z,
-            shape.opening,
+            shape.opening if handle_left else -shape.opening,
             shape.recess,
         ]
     )

@@ -264,13 +264,16 @@ def _gather(
         values[4] = 1.0 / height
         covariance[4, :] = covariance[:, 4] = 0.0
         covariance[4, 4] = (expected[1] / height**2) ** 2
+    over = np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0])
+    far = 1.0 / float(wall_line @ over)
     if lintel.z is None:
         top, deviation = _usual_top(lintel, settings)
-        far = 1.0 / float(wall_line @ np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0]))
         values[9], deviations[9] = (top - height) / far, deviation / far
     else:
         values[9] = (lintel.z - at.height) / at.distance
-        deviations[9] = lintel.deviation / at.distance
+        # Is it the frame's or, of a panel elsewhere, the panel's own?
+        apart = values[9] * (far - 1.0 / float(panel_line @ over)) / far
+        deviations[9] = np.hypot(lintel.deviation / at.distance, apart)
     covariance += np.diag(deviations**2)
     return values, covariance
 

@@ -189,6 +189,8 @@ class VerdictSettings:
         Or the step in depth, standard deviations.
     sure
         Or the network's probability of that edge.
+    min_wall
+        Share of the unhidden measurements beside the edges that lie on the wall.
     min_panel
         Share of the panel's unhidden measurements that lie on it.
     min_visible
@@ -197,8 +199,8 @@ class VerdictSettings:
         Of each edge, by the network where there is one.
     min_confidence
         Probability of both edges, by the network, that makes a door without recess and handle.
-    max_edge_deviation
-        Of an edge whose place is known, metres.
+    max_edge_deviation, max_step_deviation
+        Of an edge whose place is known, by an image and by depth alone, metres.
     rival
         A different door within so much of the best one's score leaves the question open.
     """
@@ -208,11 +210,13 @@ class VerdictSettings:
     min_coverage: Fraction
     min_step: Positive
     sure: Fraction
+    min_wall: Fraction
     min_panel: Fraction
     min_visible: Fraction
     min_probability: Fraction
     min_confidence: Fraction
     max_edge_deviation: Positive
+    max_step_deviation: Positive
     rival: NonNegative
 
 

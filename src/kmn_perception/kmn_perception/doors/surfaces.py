@@ -43,6 +43,8 @@ class Surfaces(NamedTuple):
         (12, 12) of these.
     wall_blocks, panel_blocks
         How many blocks lie on them.
+    wall_share
+        Share of the unhidden measured blocks beside the edges that lie on the wall.
     panel_share
         Share of the unhidden measured blocks between the edges that lie on the panel.
     panel_visible
@@ -55,6 +57,7 @@ class Surfaces(NamedTuple):
     covariance: NDArray[np.float64]
     wall_blocks: int
     panel_blocks: int
+    wall_share: float
     panel_share: float
     panel_visible: float
     opening: float
@@ -150,6 +153,7 @@ def fit_surfaces(
     if abs(turn) < settings.agree * deviation:
         closed = settings.closed
         values, covariance, counts = _solve(surfaces, values, closed, calibration, settings)
+    around = valid & level & beside & (offset < settings.reach)
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)
     between = seen(PANEL, unhidden, settings.block_noise)
@@ -160,6 +164,7 @@ def fit_surfaces(
         covariance=covariance,
         wall_blocks=counts[0],
         panel_blocks=counts[1],
+        wall_share=counts[0] / max(1, int(around.sum())),
         panel_share=on_panel / max(1, int((inside & ~hidden).sum())),
         panel_visible=float(unhidden.sum() / max(1, inside.sum())),
         opening=opening,

@@ -96,6 +96,9 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     width, slack = WIDTH + found.values[4], 2.0 * np.sqrt(found.covariance[4, 4])
     if not low - slack <= width <= high + slack:
         return f"the edges are {width:.2f} m apart, doors are {low:g} to {high:g} m wide"
+    if surfaces.wall_share < verdict.min_wall:
+        share = 100.0 * surfaces.wall_share
+        return f"only {share:.0f} % of what is beside the edges lie on a wall"
     if surfaces.panel_visible < verdict.min_visible:
         return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
     if surfaces.panel_share < verdict.min_panel:
@@ -115,7 +118,8 @@ def _doubt(found: Measurement, settings: DoorSettings) -> str:
     """Return which edge is not known well enough, or nothing."""
     verdict = settings.verdict
     for side, deviation in zip(("left", "right"), found.edge_deviations, strict=True):
-        if deviation > verdict.max_edge_deviation:
+        by_depth = found.candidate.edge(side).contrast == 0.0
+        if deviation > (verdict.max_step_deviation if by_depth else verdict.max_edge_deviation):
             return f"several lines may be the {side} edge: it is known to {1e3 * deviation:.0f} mm"
         probability = edge_probability(found.candidate, side)
         if found.candidate.proposals is not None and probability < verdict.min_probability:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.rotation import matrix_from_quaternion
-from kmn_perception.pipeline_interface import PipelineSettings
+from kmn_perception.pipeline_interface import CalibrationState, PipelineSettings
 from kmn_perception.ros.parameters import pick
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.segmentation import SegmentationSettings
@@ -99,6 +99,7 @@ class MorphNodeSettings:
                 ),
                 background=pick(SegmentationSettings, values),
                 scene=scene,
+                calibration=CalibrationState(values["calibration"]),
             ),
         )
 

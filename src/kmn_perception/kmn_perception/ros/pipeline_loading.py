@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.door_pipeline import DoorPipeline
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.model.room_model import has_surroundings
@@ -17,19 +16,14 @@ def load_pipeline(settings: MorphNodeSettings) -> Pipeline:
 
     Raises
     ------
-    OSError, ConfigurationError, WeightsError, ParameterError
+    OSError, ConfigurationError, WeightsError, ValueError
         If model or weights cannot be loaded.
     """
+    use_one_thread()
     pipeline: Pipeline
     if has_surroundings(settings.model):
-        if settings.weights:
-            raise ParameterError(
-                f"model '{settings.model}' is found in its surroundings without a network: "
-                f"'weights' must be empty, found '{settings.weights}'"
-            )
-        pipeline = DoorPipeline.load(settings.model, settings.pipeline)
+        pipeline = DoorPipeline.load(settings.model, settings.weights, settings.pipeline)
     else:
-        use_one_thread()
         estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
         pipeline = MorphPipeline(estimator, settings.pipeline)
     pipeline.warm_up()

@@ -22,6 +22,8 @@ UNITS = {
 EDGES = slice(0, 2)
 YAW = list(UNITS).index("yaw")
 
+CLOSED = 2.0  # degrees of opening, below which nobody calls a door ajar
+
 
 class DoorPlace(NamedTuple):
     """What is compared of a door, in the optical frame, metres.
@@ -121,8 +123,7 @@ def door_place(
     gamma = model.model.split(values[:7])[1]
     body = model.model.body("panel")
     centre, size = body.centre(gamma), body.size(gamma)
-    # An estimate's opening is a turn in the world, the model's one that of its hinge.
-    pose = np.linalg.inv(camera_pose) @ model.pose(values[:7], side, -mirror * opening)
+    pose = np.linalg.inv(camera_pose) @ model.pose(values[:7], side, opening)
 
     def to_camera(point: NDArray[np.float64]) -> NDArray[np.float64]:
         seen: NDArray[np.float64] = pose[:3, :3] @ point + pose[:3, 3]
@@ -153,7 +154,7 @@ def compare(found: DoorPlace, label: DoorLabel) -> NDArray[np.float64]:
     nothing = np.full(3, np.nan)
     handle = found.handle - (nothing if label.handle is None else label.handle)
     opening = abs(found.opening) - (label.opening.value if label.opening else np.nan)
-    is_closed = found.opening == 0.0 and label.opening is not None and label.opening.value == 0.0
+    is_closed = label.opening is not None and max(abs(found.opening), label.opening.value) < CLOSED
     sides = zip((found.left, found.right), label.edges, strict=True)
     return np.array(
         [

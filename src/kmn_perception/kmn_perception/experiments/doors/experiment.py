@@ -23,8 +23,8 @@ from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.model.room_model import RoomModel
 
 MODEL = "room_door"
-WITH_COLOUR, DEPTH_ALONE = "with_colour", "depth_alone"
-MODES = (WITH_COLOUR, DEPTH_ALONE)
+WITH_COLOUR, WITHOUT_NETWORK, DEPTH_ALONE = "with_colour", "without_network", "depth_alone"
+MODES = (WITH_COLOUR, WITHOUT_NETWORK, DEPTH_ALONE)
 MASKED = "masked_pipeline"
 
 
@@ -79,7 +79,7 @@ class DoorExperiment:
     def __init__(self, settings: ExperimentSettings, doors: DoorSettings) -> None:
         self.settings, self.doors = settings, doors
         self._limits = DoorErrorSettings.load()
-        self.model = RoomModel.load(MODEL)
+        self.model, self.network = RoomModel.load(MODEL), DoorFinder.load().network
         self.pipeline = load_pipeline()
 
     def run(self, frame: DoorFrame) -> DoorResult:
@@ -90,9 +90,15 @@ class DoorExperiment:
         depth, camera = np.nan_to_num(frame.depth), frame.description.camera
         seen = {
             WITH_COLOUR: Frame(depth, frame.grey, camera),
+            WITHOUT_NETWORK: Frame(depth, frame.grey, camera),
             DEPTH_ALONE: Frame(depth, None, camera),
         }
-        found = {mode: self._find(DoorFinder(doors), seen[mode]) for mode in MODES}
+        finders = {
+            WITH_COLOUR: DoorFinder(doors, self.network),
+            WITHOUT_NETWORK: DoorFinder(doors),
+            DEPTH_ALONE: DoorFinder(doors, self.network),
+        }
+        found = {mode: self._find(finders[mode], seen[mode]) for mode in MODES}
         estimates = {mode: estimate for mode, (estimate, _) in found.items()}
         places = {name: find(seen[WITH_COLOUR], doors) for name, find in BASELINES.items()}
         places[MASKED] = masked_pipeline(frame, self.pipeline, self.model)

@@ -10,7 +10,6 @@ import numpy as np
 from kmn_perception.evaluation.doors.error_statistics import ERRORS, coverage, error_sizes, times
 from kmn_perception.evaluation.doors.errors import UNITS, DoorErrors
 from kmn_perception.experiments.doors.experiment import (
-    DEPTH_ALONE,
     MODES,
     WITH_COLOUR,
     DoorResult,
@@ -35,7 +34,7 @@ def statistics(results: Sequence[DoorResult], settings: ExperimentSettings) -> S
             name: _of_baseline(results, [result.baselines[name] for result in results])
             for name in (results[0].baselines if results else ())
         },
-        DEPTH_ALONE: by_mode[DEPTH_ALONE],
+        **{mode: by_mode[mode] for mode in MODES if mode != WITH_COLOUR},
         "per_frame": {result.name: _of_frame(result) for result in results},
     }
 

@@ -9,11 +9,20 @@ import numpy as np
 from kmn_perception.command_line.columns import NONE, columns, text
 from kmn_perception.evaluation.doors.error_statistics import DIGITS, HEADS, error_cells, pair
 from kmn_perception.evaluation.doors.errors import UNITS
-from kmn_perception.experiments.doors.experiment import DEPTH_ALONE, WITH_COLOUR, DoorResult
+from kmn_perception.experiments.doors.experiment import (
+    DEPTH_ALONE,
+    WITH_COLOUR,
+    WITHOUT_NETWORK,
+    DoorResult,
+)
 from kmn_perception.experiments.statistics import Statistics
 
 SHOWN = ("left", "right", "width", "top", "yaw", "handle_up", "handle_along", "opening")
-NAMES = {WITH_COLOUR: "depth and colour", DEPTH_ALONE: "depth alone"}
+NAMES = {
+    WITH_COLOUR: "depth and colour",
+    WITHOUT_NETWORK: "the same without network",
+    DEPTH_ALONE: "depth alone",
+}
 
 
 def frame_table(results: Sequence[DoorResult], mode: str) -> str:
@@ -48,7 +57,9 @@ def _row(result: DoorResult, mode: str) -> list[str]:
 def method_table(summary: Statistics) -> str:
     """Return a line for each mode and baseline: medians and 95th percentiles."""
     rows = [["median / 95 %", "found", "wrong", "not there", *HEADS.values(), "in 95 %", "ms"]]
-    methods = {NAMES[WITH_COLOUR]: summary, NAMES[DEPTH_ALONE]: summary[DEPTH_ALONE]}
+    methods = {
+        name: summary if mode == WITH_COLOUR else summary[mode] for mode, name in NAMES.items()
+    }
     for name, method in {**methods, **summary["baselines"]}.items():
         doors = method["frames"] - method["negatives"]
         rows.append(

@@ -1,0 +1,183 @@
+"""Doors in rendered rooms: what is found lies within what is stated, and none is invented."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.door_finder import DoorFinder
+from kmn_perception.doors.walls import Frame
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.depth_sensor import DepthSensor
+from kmn_perception.model.noisy_sensor import NoisySensor
+from kmn_perception.rooms import frame as rooms
+from kmn_perception.rooms.rendering import render_room
+from kmn_perception.rooms.room import Room
+from kmn_perception.rooms.sampling import sample_room
+from kmn_perception.rooms.settings import CameraSettings, RoomSettings
+
+CAMERA = Camera.load("d455")
+DEVIATIONS = 3.5  # within which every value must lie
+
+
+@cache
+def finder() -> DoorFinder:
+    return DoorFinder.load()
+
+
+def settings(**door: Any) -> RoomSettings:
+    """Return clear rooms, with a door as it is said, seen from where it is easy to see."""
+    shipped = RoomSettings.load()
+    where: CameraSettings = shipped.camera._replace(
+        distance=(1.7, 2.3),
+        aside=(-0.5, 0.5),
+        height=(1.1, 1.5),
+        roll=(-0.03, 0.03),
+        both_edges=1.0,
+    )
+    plain: dict[str, Any] = {
+        "closed": 1.0, "frame": 0.0, "flush": 0.0, "handle": {"lever": 1.0},
+        "fitting": {"rosette": 1.0},
+    }  # fmt: skip
+    looks = shipped.looks._replace(alike=0.0, tiles=0.0)
+    return shipped._replace(
+        camera=where, looks=looks, door=shipped.door._replace(**{**plain, **door})
+    )
+
+
+def render(room: Room, seed: int) -> Frame:
+    images = render_room(room, RoomSettings.load().image, np.random.default_rng([seed, 1]))
+    sensor = NoisySensor(DepthSensor.load("d455"), (seed, 3), 0.0)
+    return as_seen(sensor.measure(images.depth, CAMERA.fx), images.grey, room.camera)
+
+
+def as_seen(depth: np.ndarray, grey: np.ndarray, camera: Camera) -> Frame:
+    shade = grey.astype(np.float32) / np.float32(255.0)
+    return Frame(np.nan_to_num(depth).astype(np.float32), shade, camera)
+
+
+def check(found: DoorEstimate, room: Room) -> None:
+    """Check what is said of a door against its truth."""
+    door = room.door
+    assert door is not None
+    truth = {
+        "door_height": door.values[3],
+        "door_width": door.values[4],
+        "opening": door.nuisance["opening"],
+        "recess": door.nuisance["recess"],
+    }
+    if found.status is DoorStatus.OK:
+        assert found.handle_side == door.side
+        truth |= {"handle_y": door.values[5], "handle_z": door.values[6]}
+    else:  # without a handle it is not known which side is hinged
+        truth["opening"] = np.copysign(truth["opening"], found.value("opening"))
+        truth.pop("recess") if truth["opening"] else None
+    for name, value in truth.items():
+        slack = DEVIATIONS * np.hypot(found.deviation(name), 0.003)
+        assert abs(found.value(name) - value) < slack, (name, found.value(name), value, slack)
+    normal = np.linalg.inv(room.camera.pose)[:3, :3] @ -door.frame[:3, 0]
+    assert np.degrees(np.arccos(np.clip(found.normal @ normal, -1.0, 1.0))) < 3.0
+
+
+CONDITIONS: dict[str, dict[str, Any]] = {
+    "recessed": {},
+    "flush": {"flush": 1.0},
+    "in a frame": {"frame": 1.0},
+    "flush in a frame": {"flush": 1.0, "frame": 1.0},
+    "ajar": {"closed": 0.0, "ajar": (0.08, 0.26)},
+    "knob": {"handle": {"knob": 1.0}},
+    "lever on a plate": {"fitting": {"plate": 1.0}},
+    "vertical bar": {"handle": {"bar": 1.0}},
+    "no handle": {"handle": {"none": 1.0}},
+}
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_what_is_found_lies_within_what_is_stated(condition: str) -> None:
+    found = []
+    for seed in range(4):
+        room = sample_room(seed, CAMERA, settings(**CONDITIONS[condition]), "door")
+        estimate = finder().find(render(room, seed))
+        if estimate.found:
+            check(estimate, room)
+        found.append(estimate.status)
+    seen = (DoorStatus.OK, DoorStatus.HANDLE_NOT_SEEN)
+    assert sum(status in seen for status in found) >= 2, found
+    if condition == "no handle":
+        assert DoorStatus.OK not in found
+
+
+def test_a_door_that_is_flush_is_not_seen_in_depth_alone() -> None:
+    for seed in range(3):
+        room = sample_room(seed, CAMERA, settings(flush=1.0), "door")
+        estimate = finder().find(render(room, seed)._replace(grey=None))
+        assert estimate.status is DoorStatus.NO_DOOR
+        assert estimate.reason
+
+
+def test_a_deep_recess_is_seen_in_depth_alone() -> None:
+    shipped = RoomSettings.load().door.recess
+    deep = shipped._replace(deep=(0.08, 0.15))
+    found = []
+    for seed in range(4):
+        room = sample_room(seed, CAMERA, settings(recess=deep), "door")
+        estimate = finder().find(render(room, seed)._replace(grey=None))
+        if estimate.found:
+            check(estimate, room)
+        found.append(estimate.found)
+    assert sum(found) >= 2
+
+
+@pytest.mark.parametrize(
+    "kind", ["wall", "brick", "cupboard", "window", "poster", "corridor", "glass", "double"]
+)
+def test_no_door_is_ok_where_there_is_none(kind: str) -> None:
+    for seed in range(3):
+        made = rooms.make_frame(seed, "d455", kind)
+        estimate = finder().find(as_seen(made.depth, made.images.grey, made.room.camera))
+        assert estimate.status is not DoorStatus.OK, seed
+
+
+@pytest.mark.parametrize("kind", ["person", "one_edge", "no_floor", "wide_open"])
+def test_what_is_hardly_seen_is_not_stated_firmly(kind: str) -> None:
+    for seed in range(3):
+        made = rooms.make_frame(seed, "d455", kind)
+        estimate = finder().find(as_seen(made.depth, made.images.grey, made.room.camera))
+        if estimate.found:
+            check(estimate, made.room)
+
+
+def test_the_mirror_image_of_a_frame_is_the_mirror_image_of_a_door() -> None:
+    room = sample_room(1, CAMERA, settings(), "door")
+    frame = render(room, 1)
+    camera = room.camera
+    assert frame.grey is not None
+    flipped = Frame(
+        np.ascontiguousarray(frame.depth[:, ::-1]),
+        np.ascontiguousarray(frame.grey[:, ::-1]),
+        Camera(
+            camera.width, camera.height, camera.fx, camera.fy,
+            camera.width - 1 - camera.cx, camera.cy, camera.pose,
+        ),
+    )  # fmt: skip
+    one, other = finder().find(frame), finder().find(flipped)
+    assert one.status is other.status is DoorStatus.OK
+    assert {one.handle_side, other.handle_side} == {"left", "right"}
+    for name in ("x", "door_width", "door_height", "handle_y", "handle_z", "recess"):
+        slack = 2.0 * one.deviation(name)
+        assert one.value(name) == pytest.approx(other.value(name), abs=slack), name
+    for name in ("y", "yaw"):
+        assert one.value(name) == pytest.approx(-other.value(name), abs=2.0 * one.deviation(name))
+
+
+def test_an_empty_frame_and_a_frame_without_walls_have_a_reason() -> None:
+    nothing = Frame(np.zeros((480, 640), np.float32), None, CAMERA)
+    assert finder().find(nothing).reason == "no plane is seen"
+    rays = CAMERA.rays(*np.meshgrid(np.arange(640.0), np.arange(480.0)))
+    up = np.array([0.0, -np.cos(0.9), -np.sin(0.9)])  # steeply down onto a floor
+    floor = (1.0 / np.maximum(rays @ (-up / 1.5), 1e-3)).astype(np.float32)
+    assert finder().find(Frame(floor, None, CAMERA)).reason == "no wall is seen"

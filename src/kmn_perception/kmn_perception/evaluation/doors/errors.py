@@ -74,18 +74,23 @@ class DoorErrors(NamedTuple):
         with np.errstate(divide="ignore", invalid="ignore"):  # what is stated to be exact
             return np.abs(self.values) / self.deviations
 
-    def is_far_off(self, settings: DoorErrorSettings) -> bool:
-        """Return whether the door is not where it is said to be."""
-        edge = bool((np.abs(self.values[EDGES]) > MM * settings.wrong_edge).any())
-        return edge or bool(abs(self.values[YAW]) > settings.wrong_yaw)
+    def far_off(self, settings: DoorErrorSettings) -> tuple[str, ...]:
+        """Return the edges and the yaw that are not where they are said to be."""
+        limits = np.full(len(UNITS), np.inf)
+        limits[EDGES], limits[YAW] = MM * settings.wrong_edge, settings.wrong_yaw
+        return _names(np.abs(self.values) > limits)
 
-    def breaks_promise(self, settings: DoorErrorSettings) -> bool:
-        """Return whether an error is larger than its deviation allows."""
-        return bool((self.ratios > settings.wrong_deviations).any())
+    def broken_promises(self, settings: DoorErrorSettings) -> tuple[str, ...]:
+        """Return the quantities whose errors are larger than their deviations allow."""
+        return _names(self.ratios > settings.wrong_deviations)
 
     def is_wrong(self, settings: DoorErrorSettings) -> bool:
         """Return whether a promise is broken, or the door is not where it is said to be."""
-        return self.is_far_off(settings) or self.breaks_promise(settings)
+        return bool(self.far_off(settings) or self.broken_promises(settings))
+
+
+def _names(which: NDArray[np.bool_]) -> tuple[str, ...]:
+    return tuple(name for name, is_so in zip(UNITS, which, strict=True) if is_so)
 
 
 def errors(

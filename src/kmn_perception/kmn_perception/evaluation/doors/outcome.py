@@ -35,28 +35,29 @@ class Outcome(NamedTuple):
         Of the estimate.
     errors
         None unless a door is found, and there is one.
+    faults
+        The quantities that are wrong; ``handle`` or ``door``: there is none.
     """
 
     status: DoorStatus
     reason: str
     verdict: Verdict
     errors: DoorErrors | None
+    faults: tuple[str, ...] = ()
 
 
 def judge(
     estimate: DoorEstimate, label: DoorLabel | None, model: RoomModel, limits: DoorErrorSettings
 ) -> Outcome:
     """Judge an estimate by a label that knows all of the door; None where there is no door."""
-    verdict, off = Verdict.REFUSED, None
-    if estimate.found and label is None:
-        verdict = Verdict.LIE
-    elif estimate.found and label is not None:
-        off = errors(estimate, label, model, limits)
-        is_invented = bool(estimate.handle_side) and label.handle is None
-        if is_invented or off.breaks_promise(limits):
-            verdict = Verdict.LIE
-        elif off.is_far_off(limits):
-            verdict = Verdict.IMPRECISE
-        else:
-            verdict = Verdict.RIGHT
-    return Outcome(estimate.status, estimate.reason, verdict, off)
+    status, reason = estimate.status, estimate.reason
+    if not estimate.found:
+        return Outcome(status, reason, Verdict.REFUSED, None)
+    if label is None:
+        return Outcome(status, reason, Verdict.LIE, None, ("door",))
+    off = errors(estimate, label, model, limits)
+    lies, far_off = off.broken_promises(limits), off.far_off(limits)
+    if estimate.handle_side and label.handle is None:
+        lies = (*lies, "handle")
+    verdict = Verdict.LIE if lies else Verdict.IMPRECISE if far_off else Verdict.RIGHT
+    return Outcome(status, reason, verdict, off, tuple(dict.fromkeys((*far_off, *lies))))

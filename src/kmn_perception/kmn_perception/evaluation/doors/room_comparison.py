@@ -13,7 +13,6 @@ from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import Section
 from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.doors.walls import Frame
 from kmn_perception.evaluation.comparison import Request
 from kmn_perception.evaluation.doors.label import DoorLabel, describe
@@ -24,7 +23,6 @@ from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.model.room_model import RoomModel
 from kmn_perception.network import wall_weights
-from kmn_perception.network.wall_network import WallNetwork
 from kmn_perception.network.weight_file import WeightsError
 from kmn_perception.rooms import frame as rendered
 from kmn_perception.rooms.label import label
@@ -64,7 +62,7 @@ class RoomSample(NamedTuple):
 
     Attributes
     ----------
-    kind
+    kind, seed
         Of the room.
     traits
         None without a door.
@@ -75,6 +73,7 @@ class RoomSample(NamedTuple):
     """
 
     kind: str
+    seed: int
     traits: Traits | None
     observable: bool
     outcomes: dict[str, Outcome]
@@ -114,10 +113,10 @@ class RoomComparison:
         self._request, self._doors = request, doors
         # The truth is exact: an angle of 0 is 0.
         self._limits = replace(DoorErrorSettings.load(), opening_deviation=0.0)
-        settings, wanted = DoorSettings.load(), request.methods or ROOM_METHODS
-        network = self._network(settings) if NETWORK in wanted else None
+        wanted, without = request.methods or ROOM_METHODS, DoorFinder(DoorSettings.load())
+        finder = self._with_network() or without
         self._finders = {
-            name: DoorFinder(settings, network if name == NETWORK else None)
+            name: without if name == NO_NETWORK else finder
             for name in wanted
             if name not in self.left_out
         }
@@ -130,7 +129,7 @@ class RoomComparison:
         if index >= self._doors:
             number = index - self._doors
             kind = NEGATIVES[number % len(NEGATIVES)]
-        frame = room_frame(self._request.seed, number, self.noise, kind)
+        seed, frame = room_frame(self._request.seed, number, self.noise, kind)
         text = label(frame, kind, {})
         truth = describe(Section(text, kind)).label
         depth = np.nan_to_num(frame.depth).astype(np.float32)
@@ -147,26 +146,26 @@ class RoomComparison:
         self._is_warm = True
         observable = truth is not None and truth.edges_in_view
         traits = None if truth is None else _traits(text, truth)
-        return RoomSample(kind, traits, observable, outcomes, seconds)
+        return RoomSample(kind, seed, traits, observable, outcomes, seconds)
 
-    def _network(self, settings: DoorSettings) -> WallNetwork | None:
-        """Return the network; None where the shipped one is missing, and was not asked for."""
-        given = self._request.weights or wall_weights.MODEL
+    def _with_network(self) -> DoorFinder | None:
+        """Return the finder; None where the shipped network is missing, and was not asked for."""
+        given, methods = self._request.weights or wall_weights.MODEL, self._request.methods
         try:
-            loaded = wall_weights.load(given, describe_cells(settings))
+            loaded = DoorFinder.load(given)
         except WeightsError as error:
             if self._request.weights:
                 raise
-            if self._request.methods is not None and not self._request.lenient:
+            if methods is not None and NETWORK in methods and not self._request.lenient:
                 raise MethodError(f"{NETWORK}: {error}") from error
             self.left_out[NETWORK] = str(error)
             return None
         self.hashes["own"] = short_hash(resources.find("weights", given, ".safetensors"))
-        return loaded.network
+        return loaded
 
 
-def room_frame(seed: int, number: int, noise: str, kind: str) -> rendered.Frame:
-    """Return a frame that never trained: the rooms of training have seeds of 32 bits.
+def room_frame(seed: int, number: int, noise: str, kind: str) -> tuple[int, rendered.Frame]:
+    """Return a frame that never trained, and its seed; those of training have 32 bits.
 
     Raises
     ------
@@ -178,10 +177,10 @@ def room_frame(seed: int, number: int, noise: str, kind: str) -> rendered.Frame:
     *seeds, last = (int(state) for state in sequence.generate_state(TRIES, np.uint64))
     for candidate in seeds:
         try:
-            return rendered.make_frame(candidate, sensor, kind)
+            return candidate, rendered.make_frame(candidate, sensor, kind)
         except RuntimeError:
             continue
-    return rendered.make_frame(last, sensor, kind)
+    return last, rendered.make_frame(last, sensor, kind)
 
 
 def _check(request: Request, name: str) -> None:

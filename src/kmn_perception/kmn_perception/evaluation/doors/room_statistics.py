@@ -42,6 +42,7 @@ def _of_method(
     return {
         "of_observable": counts([sample.outcomes[name] for sample in seen]),
         "of_all": counts(outcomes),
+        "wrong": _faults(name, doors),
         "refused": _reasons([sample.outcomes[name] for sample in seen], settings.reasons),
         **{key: error_sizes(off, key) for key in ERRORS},
         "coverage95": coverage(off, settings.confidence),
@@ -85,6 +86,16 @@ def _found(outcomes: Sequence[Outcome]) -> dict[str, int]:
         "rooms": len(outcomes),
         "ok": statuses[DoorStatus.OK],
         "not_seen": statuses[DoorStatus.HANDLE_NOT_SEEN],
+    }
+
+
+def _faults(name: str, doors: Sequence[RoomSample]) -> Statistics:
+    """Return which quantities are wrong how often, and in which rooms, by the seeds of these."""
+    wrong = [(s.seed, s.outcomes[name]) for s in doors if s.outcomes[name].verdict.is_wrong]
+    faults = Counter(fault for _, outcome in wrong for fault in outcome.faults)
+    return {
+        "quantities": dict(sorted(faults.items(), key=lambda item: (-item[1], item[0]))),
+        "rooms": {str(seed): [outcome.status.name, *outcome.faults] for seed, outcome in wrong},
     }
 
 

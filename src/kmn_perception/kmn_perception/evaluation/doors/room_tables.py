@@ -39,6 +39,7 @@ def room_report(result: dict[str, Any]) -> str:
         f"Of all {doors} doors\n{_counts(methods, 'of_all')}",
         "Errors of the doors that are found: median / 95th percentile, mm and degrees\n"
         + columns([["method", *HEADS.values(), "in 95 %", "ms"], *map(_errors, methods.items())]),
+        "What is wrong, of all doors that are found\n" + _faults(methods),
         *(f"Refused by {name}, of those in view\n{_reasons(m)}" for name, m in methods.items()),
         *_breakdowns(methods),
         "Doors that are not there: OK / handle not seen, of rooms\n" + _negatives(methods),
@@ -63,6 +64,14 @@ def _errors(item: tuple[str, dict[str, Any]]) -> list[str]:
     name, method = item
     covered = NONE if method["coverage95"] is None else f"{text(method['coverage95'], 100, 1)} %"
     return [name, *error_cells(method), covered, pair(method["milliseconds"], 0)]
+
+
+def _faults(methods: dict[str, Any]) -> str:
+    rows = [["method", "wrong", "quantities"]]
+    for name, method in methods.items():
+        parts = (f"{fault} {count}" for fault, count in method["wrong"]["quantities"].items())
+        rows.append([name, str(len(method["wrong"]["rooms"])), ", ".join(parts) or NONE])
+    return columns(rows)
 
 
 def _reasons(method: dict[str, Any]) -> str:

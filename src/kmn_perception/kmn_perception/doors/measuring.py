@@ -166,7 +166,7 @@ def edge_spread(candidate: Candidate, side: str, settings: DoorSettings) -> floa
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
         if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
-            weights.append(min(line.contrast, 1.0) ** 2 * _probability(candidate, side, line))
+            weights.append((min(line.contrast, 1.0) * _probability(candidate, side, line)) ** 2)
             offsets.append(offset)
     if not sum(weights):
         return 0.0
@@ -256,23 +256,27 @@ def _gather(
     values[12], deviations[12] = settings.handle.protrusion
     covariance = np.zeros((13, 13))
     covariance[:5, :5] = surfaces.covariance[:5, :5]
-    if not floor:
-        # The handle's usual height tells the floor's, and no more than that.
-        if handle is not None:
-            away = 1.0 / float(panel_line @ np.array([values[10], 1.0]))
-            height = expected[0] - values[11] * away
-        values[4] = 1.0 / height
-        covariance[4, :] = covariance[:, 4] = 0.0
-        covariance[4, 4] = (expected[1] / height**2) ** 2
     over = np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0])
     far = 1.0 / float(wall_line @ over)
-    if lintel.z is None:
+    rise = None if lintel.z is None else (lintel.z - at.height) / at.distance
+    if not floor:
+        # The usual height of handle or top tells the floor's, and no more than that.
+        height, slack = settings.prior.camera_height
+        if handle is not None:
+            away = 1.0 / float(panel_line @ np.array([values[10], 1.0]))
+            height, slack = expected[0] - values[11] * away, expected[1]
+        elif rise is not None:
+            height, slack = settings.prior.height[0] - rise * far, settings.prior.height[1]
+        values[4] = 1.0 / height
+        covariance[4, :] = covariance[:, 4] = 0.0
+        covariance[4, 4] = (slack / height**2) ** 2
+    if rise is None:
         top, deviation = _usual_top(lintel, settings)
         values[9], deviations[9] = (top - height) / far, deviation / far
     else:
-        values[9] = (lintel.z - at.height) / at.distance
         # Is it the frame's or, of a panel elsewhere, the panel's own?
-        apart = values[9] * (far - 1.0 / float(panel_line @ over)) / far
+        apart = rise * (far - 1.0 / float(panel_line @ over)) / far
+        values[9] = rise
         deviations[9] = np.hypot(lintel.deviation / at.distance, apart)
     covariance += np.diag(deviations**2)
     return values, covariance

@@ -223,6 +223,7 @@ class VerdictSettings:
 class PriorSettings(NamedTuple):
     """What is known of doors where the view does not show it: value and deviation, metres."""
 
+    camera_height: tuple[float, float]
     height: tuple[float, float]
     handle_height: tuple[float, float]
     handle_inset: tuple[float, float]

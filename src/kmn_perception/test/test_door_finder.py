@@ -181,3 +181,19 @@ def test_an_empty_frame_and_a_frame_without_walls_have_a_reason() -> None:
     up = np.array([0.0, -np.cos(0.9), -np.sin(0.9)])  # steeply down onto a floor
     floor = (1.0 / np.maximum(rays @ (-up / 1.5), 1e-3)).astype(np.float32)
     assert finder().find(Frame(floor, None, CAMERA)).reason == "no wall is seen"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_a_frame_holds_has_an_answer(seed: int) -> None:
+    """Random planes at any angle, noise, holes and stripes: an estimate or a reason, no error."""
+    generator = np.random.default_rng(seed)
+    rays = CAMERA.rays(*np.meshgrid(np.arange(640.0), np.arange(480.0)))
+    for _ in range(3):
+        vectors = generator.normal(0.0, 0.5, (generator.integers(1, 6), 3)) + [0.0, 0.0, 0.4]
+        inverse = np.max(rays @ vectors.T, axis=-1) + generator.normal(0.0, 0.004, (480, 640))
+        depth = np.where(inverse > 0.05, 1.0 / np.maximum(inverse, 0.05), 0.0)
+        depth[generator.random((480, 640)) < generator.random() ** 2] = 0.0
+        stripes = np.repeat(generator.random(40), 16)[None] + generator.normal(0, 0.02, (480, 640))
+        for grey in (None, np.clip(stripes, 0.0, 1.0).astype(np.float32)):
+            estimate = finder().find(Frame(depth.astype(np.float32), grey, CAMERA))
+            assert estimate.status is DoorStatus.OK or estimate.reason

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
+from kmn_perception.doors.edges import measure_edge
 from kmn_perception.doors.geometry import (
     DoorShape,
     View2d,
@@ -17,20 +18,16 @@ from kmn_perception.doors.geometry import (
 )
 from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
-from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
 from kmn_perception.doors.lintel import Lintel, find_lintel
-from kmn_perception.doors.proposals import handle_of, near
+from kmn_perception.doors.proposals import handle_of
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
-from kmn_perception.doors.view_cells import cell_of
-from kmn_perception.doors.wall_view import WallFrame, WallView
+from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.doors.walls import Frame
 
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
-_STEP_NOISE = 0.012  # metres, of an edge that only depth or the network tell
-_UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
 class Measurement(NamedTuple):
@@ -67,20 +64,17 @@ def measure(
 ) -> Measurement | None:
     """Measure a candidate; None where wall or panel are hardly seen."""
     at = candidate.view.frame
-    edges = [_edge(candidate, line, settings) for line in (candidate.left, candidate.right)]
-    spreads = [edge_spread(candidate, side, settings) for side in ("left", "right")]
-    edges = [
-        (direction, float(np.hypot(deviation, spread / at.distance)))
-        for (direction, deviation), spread in zip(edges, spreads, strict=True)
-    ]
+    edges = [measure_edge(candidate, side, settings) for side in ("left", "right")]
     directions = edges[0][0], edges[1][0]
     surfaces = fit_surfaces(blocks, at, directions, floor, settings.calibration, settings.fit)
-    if surfaces is None:
+    if surfaces is None or not _is_possible(surfaces, directions, settings):
         return None
     heights = _lintel_heights(at, directions, surfaces, settings)
     lintel = find_lintel(candidate, heights, settings.lintel)
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
     on_panel = tuple(_along(at, panel, surfaces, direction) for direction in directions)
+    if not on_panel[1] - on_panel[0] > settings.lines.tie:
+        return None  # so oblique a panel shows nothing
     handle = find_handle(
         panel, (on_panel[0], on_panel[1]), frame.depth, frame.grey, frame.camera,
         settings.handle, settings.lines.step_noise, _hint(candidate, panel),
@@ -105,6 +99,16 @@ def measure(
         (edges[0][1] * at.distance, edges[1][1] * at.distance),
         floor,
     )
+
+
+def _is_possible(
+    surfaces: Surfaces, directions: tuple[float, float], settings: DoorSettings
+) -> bool:
+    """Return whether the camera, above a floor, sees wall and panel in both directions of edges."""
+    rays = np.array([[direction, 1.0] for direction in directions])
+    seen = np.stack([rays @ surfaces.values[WALL], rays @ surfaces.values[PANEL]])
+    reach = settings.view.reach
+    return bool((seen > 1.0 / reach).all() and surfaces.values[FLOOR] > 1.0 / reach)
 
 
 def _hint(candidate: Candidate, panel: WallFrame) -> Hint | None:
@@ -141,78 +145,6 @@ def _along(at: WallFrame, panel: WallFrame, surfaces: Surfaces, direction: float
     ray = np.array([direction, 1.0])
     point = ray / (surfaces.values[PANEL] @ ray)
     return float(point[0] * (at.right @ panel.right) - point[1] * (at.normal @ panel.right))
-
-
-def _edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tuple[float, float]:
-    """Return the direction of an edge and its standard deviation, from its pieces."""
-    view, pieces = candidate.view, candidate.pieces
-    distance = view.frame.distance
-    noise = settings.fit.edge_noise * float(view.footprint[line.column]) / distance
-    if line.contrast == 0.0:
-        return float(view.s[line.column]) / distance, 3.0 * noise + _STEP_NOISE / distance
-    position, spread = _subpixel(view, pieces, line, settings)
-    return position / distance, float(np.hypot(noise, spread / distance))
-
-
-def edge_spread(candidate: Candidate, side: str, settings: DoorSettings) -> float:
-    """Return how far other lines that may be the edge lie from the one that was taken, metres.
-
-    Frame, panel and what stands beside them have edges side by side. Each counts by the square of
-    its contrast and, with a network, by the probability that it is the door's.
-    """
-    chosen = candidate.edge(side)
-    pixel = float(candidate.view.s[1] - candidate.view.s[0])
-    weights, offsets = [], []
-    for line in candidate.lines:
-        offset = (line.column - chosen.column) * pixel
-        if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
-            weights.append((min(line.contrast, 1.0) * _probability(candidate, side, line)) ** 2)
-            offsets.append(offset)
-    if not sum(weights):
-        return 0.0
-    return float(np.sqrt(np.average(np.square(offsets), weights=weights)))
-
-
-def _probability(candidate: Candidate, side: str, line: Line) -> float:
-    """Return the network's probability that a line is the door's edge; 1 without a network."""
-    if candidate.proposals is None:
-        return 1.0
-    found = candidate.proposals.left if side == "left" else candidate.proposals.right
-    return near(found, round(cell_of(candidate.view, line.column)), 1) + _UNLIKELY
-
-
-def _subpixel(
-    view: WallView, pieces: Pieces, line: Line, settings: DoorSettings
-) -> tuple[float, float]:
-    """Return the place of an edge and the standard deviation of its mean, metres."""
-    assert view.grey is not None
-    fine = settings.lines.fine_smoothing
-    reach = round(0.5 * settings.lines.tie / float(view.s[1] - view.s[0])) + int(np.ceil(3 * fine))
-    first = max(line.column - reach, 0)
-    columns = slice(first, line.column + reach + 1)
-    places = []
-    for k in np.flatnonzero(pieces.body):
-        if not pieces.known[k, columns].mean() > 0.7:
-            continue
-        shade = view.grey[pieces.rows == k, columns].mean(axis=0)
-        profile = line.sign * gaussian_steps(shade[None], fine)[0]
-        near = np.abs(first + np.arange(len(profile)) - line.column) <= 3
-        if profile[near].max() < 0.6 * settings.lines.min_contrast:
-            continue
-        peak = int(np.where(near, profile, -1.0).argmax())
-        window = slice(max(peak - 2, 0), peak + 3)
-        weights = np.maximum(profile[window] - 0.5 * profile[peak], 0.0)
-        at = first + window.start + np.arange(len(weights))
-        places.append(float((weights * at).sum() / weights.sum()))
-    pixel = float(view.s[1] - view.s[0])
-    if len(places) < 3:
-        return float(view.s[line.column]), 2.0 * pixel
-    found = np.array(places)
-    middle = np.median(found)
-    scatter = max(1.48 * float(np.median(np.abs(found - middle))), 0.6)
-    near = found[np.abs(found - middle) < 3.0 * scatter]
-    spread = float(near.std()) / np.sqrt(max(len(near) / 3.0, 1.0))
-    return float(view.s[0] + near.mean() * pixel), spread * pixel
 
 
 def _gather(

@@ -1,0 +1,95 @@
+"""The upright edges of a candidate: their directions, finely, and how sure their place is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kmn_perception.doors.candidates import Candidate
+from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
+from kmn_perception.doors.proposals import near
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.view_cells import cell_of
+from kmn_perception.doors.wall_view import WallView
+
+_STEP_NOISE = 0.012  # metres, of an edge that only depth or the network tell
+_UNLIKELY = 0.02  # what a place that the network finds impossible still counts
+
+
+def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tuple[float, float]:
+    """Return the direction of an edge and its standard deviation, rivals included.
+
+    Returns
+    -------
+    direction, deviation
+        Metres to the right per metre away from the camera.
+    """
+    line, distance = candidate.edge(side), candidate.view.frame.distance
+    noise = settings.fit.edge_noise * float(candidate.view.footprint[line.column])
+    rivals = _spread(candidate, side, settings)
+    if line.contrast == 0.0:
+        place, scatter = float(candidate.view.s[line.column]), 3.0 * noise + _STEP_NOISE
+    else:
+        place, scatter = _subpixel(candidate.view, candidate.pieces, line, settings)
+    deviation = np.sqrt(noise**2 + scatter**2 + rivals**2)
+    return place / distance, float(deviation) / distance
+
+
+def _spread(candidate: Candidate, side: str, settings: DoorSettings) -> float:
+    """Return how far other lines that may be the edge lie from the one that was taken, metres.
+
+    Frame, panel and what stands beside them have edges side by side. Each counts by the square of
+    its contrast and, with a network, by the probability that it is the door's.
+    """
+    chosen = candidate.edge(side)
+    pixel = float(candidate.view.s[1] - candidate.view.s[0])
+    weights, offsets = [], []
+    for line in candidate.lines:
+        offset = (line.column - chosen.column) * pixel
+        if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
+            weights.append((min(line.contrast, 1.0) * _probability(candidate, side, line)) ** 2)
+            offsets.append(offset)
+    if not sum(weights):
+        return 0.0
+    return float(np.sqrt(np.average(np.square(offsets), weights=weights)))
+
+
+def _probability(candidate: Candidate, side: str, line: Line) -> float:
+    """Return the network's probability that a line is the door's edge; 1 without a network."""
+    if candidate.proposals is None:
+        return 1.0
+    found = candidate.proposals.left if side == "left" else candidate.proposals.right
+    return near(found, round(cell_of(candidate.view, line.column)), 1) + _UNLIKELY
+
+
+def _subpixel(
+    view: WallView, pieces: Pieces, line: Line, settings: DoorSettings
+) -> tuple[float, float]:
+    """Return the place of an edge and the standard deviation of its mean, metres."""
+    assert view.grey is not None
+    fine = settings.lines.fine_smoothing
+    reach = round(0.5 * settings.lines.tie / float(view.s[1] - view.s[0])) + int(np.ceil(3 * fine))
+    first = max(line.column - reach, 0)
+    columns = slice(first, line.column + reach + 1)
+    places = []
+    for k in np.flatnonzero(pieces.body):
+        if not pieces.known[k, columns].mean() > 0.7:
+            continue
+        shade = view.grey[pieces.rows == k, columns].mean(axis=0)
+        profile = line.sign * gaussian_steps(shade[None], fine)[0]
+        near = np.abs(first + np.arange(len(profile)) - line.column) <= 3
+        if profile[near].max() < 0.6 * settings.lines.min_contrast:
+            continue
+        peak = int(np.where(near, profile, -1.0).argmax())
+        window = slice(max(peak - 2, 0), peak + 3)
+        weights = np.maximum(profile[window] - 0.5 * profile[peak], 0.0)
+        at = first + window.start + np.arange(len(weights))
+        places.append(float((weights * at).sum() / weights.sum()))
+    pixel = float(view.s[1] - view.s[0])
+    if len(places) < 3:
+        return float(view.s[line.column]), 2.0 * pixel
+    found = np.array(places)
+    middle = np.median(found)
+    scatter = max(1.48 * float(np.median(np.abs(found - middle))), 0.6)
+    near = found[np.abs(found - middle) < 3.0 * scatter]
+    spread = float(near.std()) / np.sqrt(max(len(near) / 3.0, 1.0))
+    return float(view.s[0] + near.mean() * pixel), spread * pixel

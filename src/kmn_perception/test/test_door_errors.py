@@ -8,57 +8,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.geometry import DOOR, View2d, door_shape, door_values
-from kmn_perception.experiments.doors.errors import UNITS, DoorErrors, door_place, errors
-from kmn_perception.experiments.doors.label import DoorLabel, Edge, Known
-from kmn_perception.experiments.settings import ExperimentSettings
-from kmn_perception.model.room_model import RoomModel
+from kmn_perception.doors.door_estimate import DoorEstimate
+from kmn_perception.doors.geometry import View2d, door_shape, door_values
+from kmn_perception.evaluation.doors.errors import UNITS, DoorErrors, door_place, errors
+from kmn_perception.evaluation.doors.label import DoorLabel, Known
 
-SETTINGS = ExperimentSettings.load().doors
-MODEL = RoomModel.load("room_door")
-HEIGHT = 1.2  # of the camera, metres, which looks along x
-POSE = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, HEIGHT], [0, 0, 0, 1]], dtype=float)
-WIDTH, TOP, FRONT, AWAY = 0.9, 2.1, 0.019, 2.0
-# A closed panel 2 m ahead, 0.9 m wide, 2.1 m high, handle at the right 85 mm from the edge.
-TRUTH = {"x": AWAY + FRONT, "door_height": 0.1, "door_width": 0.1, "handle_y": -0.01}
-HANDLE = np.array([WIDTH / 2 - 0.085, HEIGHT - 1.05, AWAY - 0.051])
-
-
-def _edge(right: float, deviation: float) -> Edge:
-    top, bottom = (np.array([right, HEIGHT - z, AWAY]) for z in (TOP, 0.0))
-    return Edge(top, bottom, deviation, visible=True)
-
-
-LABEL = DoorLabel(
-    normal=np.array([0.0, 0.0, -1.0]),
-    up=np.array([0.0, -1.0, 0.0]),
-    right=np.array([1.0, 0.0, 0.0]),
-    centre=np.array([0.0, HEIGHT - TOP / 2, AWAY]),
-    yaw_deviation=0.1,
-    distance_deviation=0.004,
-    edges=(_edge(-WIDTH / 2, 0.012), _edge(WIDTH / 2, 0.0)),
-    width=Known(WIDTH, 0.008),
-    top=Known(TOP, 0.0),
-    handle=HANDLE,
-    handle_deviation=np.array([0.003, 0.0, 0.02]),
-    handle_side="right",
-    opening=Known(0.0, 0.0),
-    camera_pose=POSE,
-    panel=np.empty((0, 2)),
+from .door_example import (
+    FRONT,
+    HANDLE,
+    HEIGHT,
+    LABEL,
+    MODEL,
+    POSE,
+    SETTINGS,
+    TRUTH,
+    WIDTH,
+    estimate_of,
 )
-
-
-def _estimate(deviations: dict[str, float] | None = None, **values: float) -> DoorEstimate:
-    known = {**TRUTH, **values}
-    variances = [(deviations or {}).get(name, 0.0) ** 2 for name in DOOR]
-    return replace(
-        DoorEstimate.none("", DoorStatus.OK),
-        values=np.array([known.get(name, 0.0) for name in DOOR]),
-        covariance=np.diag(variances),
-        handle_side="right",
-        camera_pose=POSE,
-    )
 
 
 def _compare(estimate: DoorEstimate, label: DoorLabel = LABEL) -> DoorErrors:
@@ -70,7 +36,7 @@ def _named(values: NDArray[np.float64]) -> dict[str, float]:
 
 
 def test_a_perfect_estimate_has_no_errors() -> None:
-    values = _named(_compare(_estimate()).values)
+    values = _named(_compare(estimate_of()).values)
     assert np.isnan(values.pop("opening"))  # both are closed
     np.testing.assert_allclose(list(values.values()), 0.0, atol=1e-9)
 
@@ -78,7 +44,7 @@ def test_a_perfect_estimate_has_no_errors() -> None:
 def test_errors_are_estimate_minus_label_along_the_labels_axes() -> None:
     # 10 mm farther, 4 mm to the left, 20 mm wider, 30 mm higher; the handle 7 mm to the left of
     # where it would be then, and 5 mm lower.
-    moved = _estimate(
+    moved = estimate_of(
         x=TRUTH["x"] + 0.01, y=0.004, door_width=0.12, door_height=0.13, handle_y=-0.003,
         handle_z=-0.02,
     )  # fmt: skip
@@ -93,7 +59,7 @@ def test_errors_are_estimate_minus_label_along_the_labels_axes() -> None:
 
 def test_a_turned_panel_has_its_yaw_and_its_edges_off() -> None:
     yaw = np.radians(2.0)  # to the left, about the panel's middle
-    values = _named(_compare(_estimate(yaw=yaw)).values)
+    values = _named(_compare(estimate_of(yaw=yaw)).values)
     c, s = np.cos(yaw), np.sin(yaw)
     assert values["yaw"] == pytest.approx(2.0, abs=1e-9)
     assert values["left"] == pytest.approx(1e3 * (WIDTH / 2 * (1 - c) + FRONT * s), abs=1e-6)
@@ -103,7 +69,7 @@ def test_a_turned_panel_has_its_yaw_and_its_edges_off() -> None:
 
 def test_deviations_follow_from_the_covariance_and_join_those_of_the_label() -> None:
     deviations = {"x": 0.003, "y": 0.004, "door_width": 0.006, "door_height": 0.02}
-    found = _compare(_estimate(deviations))
+    found = _compare(estimate_of(deviations))
     stated, combined = _named(found.stated), _named(found.deviations)
     # Half of the width's deviation moves an edge: 3, 4, 5. Half of the height's moves the handle.
     assert (stated["left"], stated["right"]) == pytest.approx((5.0, 5.0), abs=1e-6)
@@ -119,12 +85,12 @@ def test_deviations_follow_from_the_covariance_and_join_those_of_the_label() -> 
 @pytest.mark.parametrize(
     ("estimate", "is_wrong"),
     [
-        (_estimate({"y": 0.1}, y=0.029), False),
-        (_estimate({"y": 0.1}, y=0.031), True),
-        (_estimate({"yaw": 0.1}, yaw=np.radians(2.9)), False),
-        (_estimate({"yaw": 0.1}, yaw=np.radians(3.1)), True),
-        (_estimate({"door_height": 0.01}, door_height=0.1 + 0.029), False),
-        (_estimate({"door_height": 0.01}, door_height=0.1 + 0.031), True),
+        (estimate_of({"y": 0.1}, y=0.029), False),
+        (estimate_of({"y": 0.1}, y=0.031), True),
+        (estimate_of({"yaw": 0.1}, yaw=np.radians(2.9)), False),
+        (estimate_of({"yaw": 0.1}, yaw=np.radians(3.1)), True),
+        (estimate_of({"door_height": 0.01}, door_height=0.1 + 0.029), False),
+        (estimate_of({"door_height": 0.01}, door_height=0.1 + 0.031), True),
     ],
 )
 def test_wrong_is_what_breaks_a_limit_or_a_promise(estimate: DoorEstimate, is_wrong: bool) -> None:
@@ -133,14 +99,14 @@ def test_wrong_is_what_breaks_a_limit_or_a_promise(estimate: DoorEstimate, is_wr
 
 
 def test_a_handle_at_the_other_edge_is_wrong() -> None:
-    mirrored = replace(_estimate({"y": 0.005, "handle_y": 0.01}), handle_side="left")
+    mirrored = replace(estimate_of({"y": 0.005, "handle_y": 0.01}), handle_side="left")
     found = _compare(mirrored)
     assert _named(found.values)["handle_along"] == pytest.approx(-1e3 * 2 * HANDLE[0], abs=1e-6)
     assert found.is_wrong(SETTINGS)
 
 
 def test_an_open_door_that_is_taken_for_closed_is_wrong() -> None:
-    found = _compare(_estimate(), LABEL._replace(opening=Known(4.0, 0.3), handle=None))
+    found = _compare(estimate_of(), LABEL._replace(opening=Known(4.0, 0.3), handle=None))
     assert _named(found.values)["opening"] == pytest.approx(-4.0)
     assert _named(found.deviations)["opening"] == pytest.approx(SETTINGS.opening_deviation)
     assert found.is_wrong(SETTINGS)
@@ -148,7 +114,7 @@ def test_an_open_door_that_is_taken_for_closed_is_wrong() -> None:
 
 def test_what_a_label_or_an_estimate_does_not_know_is_not_compared() -> None:
     label = LABEL._replace(top=None, edges=(None, LABEL.edges[1]))
-    values = _named(_compare(replace(_estimate(), handle_side=""), label).values)
+    values = _named(_compare(replace(estimate_of(), handle_side=""), label).values)
     unknown = {name for name, value in values.items() if np.isnan(value)}
     assert unknown == {"left", "top", "handle_up", "handle_along", "opening"}
 

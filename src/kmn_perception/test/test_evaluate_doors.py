@@ -15,10 +15,10 @@ import pytest
 
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.experiments.doors.errors import UNITS
+from kmn_perception.evaluation.doors.errors import UNITS
+from kmn_perception.evaluation.doors.label import SIDES, describe_camera
 from kmn_perception.experiments.doors.experiment import WITH_COLOUR, DoorExperiment
 from kmn_perception.experiments.doors.frames import FrameFiles, find_frames
-from kmn_perception.experiments.doors.label import SIDES, describe_camera
 from kmn_perception.experiments.doors.statistics import statistics
 from kmn_perception.experiments.evaluate_doors import main
 from kmn_perception.experiments.labelled_frame import FrameError

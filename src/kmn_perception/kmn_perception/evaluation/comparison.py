@@ -26,6 +26,7 @@ from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.visible_fraction import visible_fraction
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
+from kmn_perception.model.sensor_noise import NOISES
 from kmn_perception.network.errors import absolute_errors
 from kmn_perception.network.weights import Weights
 from kmn_perception.training.samples import EVALUATION, sample
@@ -95,6 +96,11 @@ class Comparison:
         self.model = KinematicModel.load(request.model)
         self.networks = load_networks(self.model, request.weights, request.paper_weights)
         names = NAMES if request.methods is None else request.methods
+        if request.noise not in (None, *NOISES):
+            raise MethodError(
+                f"'{self.model.name}' is seen with the noise {', '.join(NOISES)}, "
+                f"found '{request.noise}'"
+            )
         self._methods, self.left_out = choose(
             [name for name in names if name != LIMIT], self.model, self.networks, settings
         )

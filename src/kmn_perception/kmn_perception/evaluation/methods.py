@@ -152,6 +152,9 @@ def choose(
     """Return methods by name; of those that lack something, the reason by name."""
     chosen, left_out = {}, {}
     for name in names:
+        if name not in METHODS:
+            left_out[name] = f"no method for '{model.name}'"
+            continue
         try:
             chosen[name] = METHODS[name](model, networks, settings)
         except MethodError as error:

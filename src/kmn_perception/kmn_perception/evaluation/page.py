@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kmn_perception.command_line.columns import NONE
 from kmn_perception.evaluation.settings import PaperErrors
 from kmn_perception.evaluation.table import (
-    NONE,
     PAPER_METHOD,
     Rows,
     by_parameter,

@@ -5,39 +5,45 @@ from __future__ import annotations
 import math
 import multiprocessing
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
-from kmn_perception.evaluation.comparison import Comparison, Measurement, Request
-from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.network.threads import use_one_thread
 
 MIN_SAMPLES = 50  # of a process; for fewer its start, some seconds, does not pay
 
-Measured = tuple[float, dict[str, Measurement]]
+Measured = TypeVar("Measured")
+Measure = Callable[[int], Measured]
 
-_comparison: Comparison  # of a started process
+_measure: Measure[Any]  # of a started process
 
 
 def measurements(
-    comparison: Comparison, request: Request, settings: EvaluationSettings, samples: int, jobs: int
+    measure: Measure[Measured], make: Callable[[], Measure[Measured]], samples: int, jobs: int
 ) -> Iterator[Measured]:
-    """Yield what ``comparison`` measures on samples 0, 1, 2, ..., in this order."""
+    """Yield what is measured on samples 0, 1, 2, ..., in this order.
+
+    Parameters
+    ----------
+    measure, make
+        What measures a sample, and what makes its like in each of the processes.
+    """
     count = min(jobs, math.ceil(samples / MIN_SAMPLES))
     if count == 1:
         use_one_thread()
-        yield from map(comparison, range(samples))
+        yield from map(measure, range(samples))
         return
     context = multiprocessing.get_context("spawn")
-    with context.Pool(count, _start, (request, settings)) as pool:
-        yield from pool.imap(_measure, range(samples))
+    with context.Pool(count, _start, (make,)) as pool:
+        yield from pool.imap(_run, range(samples))
 
 
-def _start(request: Request, settings: EvaluationSettings) -> None:
-    global _comparison
+def _start(make: Callable[[], Measure[Any]]) -> None:
+    global _measure
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
     use_one_thread()
-    _comparison = Comparison(request, settings)
+    _measure = make()
 
 
-def _measure(index: int) -> Measured:
-    return _comparison(index)
+def _run(index: int) -> Any:
+    return _measure(index)

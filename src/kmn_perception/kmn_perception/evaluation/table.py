@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from kmn_perception.command_line.columns import columns
+from kmn_perception.command_line.columns import NONE, columns
 from kmn_perception.evaluation.settings import PaperErrors
 
-NONE = "-"
 FEW_DIGITS = 1e-4  # smaller errors are written with an exponent
 
 PAPER_METHOD = {

@@ -12,9 +12,9 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, output_folder, write_json
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.evaluation.doors.label import describe_camera
 from kmn_perception.experiments.doors.experiment import MODES, DoorExperiment
 from kmn_perception.experiments.doors.frames import DEPTHS, find_frames
-from kmn_perception.experiments.doors.label import describe_camera
 from kmn_perception.experiments.doors.pictures import Pictures
 from kmn_perception.experiments.doors.statistics import statistics
 from kmn_perception.experiments.doors.tables import frame_table, in_view, method_table

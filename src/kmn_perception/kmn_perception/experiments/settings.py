@@ -70,18 +70,9 @@ class DoorExperimentSettings:
     ----------
     camera
         In ``config/cameras``, of frames without a JSON file.
-    wrong_edge, wrong_yaw, wrong_deviations
-        An error above these is a wrong answer: of an edge, metres; of the yaw, degrees; of any
-        quantity, in standard deviations of estimate and label together.
-    opening_deviation
-        Minimum of the standard deviation of a label's opening angle, degrees.
     """
 
     camera: str
-    wrong_edge: Positive
-    wrong_yaw: Positive
-    wrong_deviations: Positive
-    opening_deviation: Positive
 
 
 @dataclass(frozen=True)

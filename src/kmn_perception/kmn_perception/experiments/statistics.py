@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from kmn_perception.command_line.columns import columns
+from kmn_perception.command_line.columns import NONE, columns, text
+from kmn_perception.evaluation.quantile import quantile
 from kmn_perception.experiments.experiment import FrameResult
 from kmn_perception.experiments.scores import Score
 from kmn_perception.experiments.settings import ExperimentSettings
 
-NONE = "-"
 Statistics = dict[str, Any]
 
 
@@ -108,11 +108,6 @@ def _reference_deviation(scores: Sequence[Score], settings: ExperimentSettings) 
     return {"yaw_deg": {"median": quantile(yaw, 50)}, "side_m": {"median": quantile(sides, 50)}}
 
 
-def quantile(values: Sequence[float], percent: float) -> float | None:
-    """Return a percentile, rounded; None of no values."""
-    return _round(float(np.percentile(values, percent)), 5) if values else None
-
-
 def _mean(values: Sequence[int]) -> float | None:
     return _round(float(np.mean(values)), 3) if values else None
 
@@ -167,11 +162,6 @@ def method_table(result: Statistics) -> str:
     for name, method in {"this package": result, **result["baselines"]}.items():
         rows.append([name, *[cell(method) for _, cell in parts]])
     return columns(rows)
-
-
-def text(value: float | None, scale: float, digits: int) -> str:
-    """Return a number for a table."""
-    return NONE if value is None else f"{scale * value:.{digits}f}"
 
 
 def details(result: Statistics) -> str:

@@ -59,6 +59,8 @@ KINDS = {
     "doorway": Kind(negatives.build_doorway),
 }
 
+WITH_DOOR = (build_door, negatives.build_person)
+NEGATIVES = tuple(name for name, kind in KINDS.items() if kind.build not in WITH_DOOR)
 
 _model = cache(RoomModel.load)  # which takes longer than all draws
 
@@ -69,7 +71,7 @@ def sample_room(seed: int, camera: Camera, settings: RoomSettings, kind: str = "
     Parameters
     ----------
     kind
-        One of ``KINDS``; the first five have a door.
+        One of ``KINDS``; all but ``NEGATIVES`` have a door.
     """
     draw, model = Draw(seed, crc32(kind.encode())), _model(settings.model)
     design, where = draw_design(draw, model, settings.door), settings.camera

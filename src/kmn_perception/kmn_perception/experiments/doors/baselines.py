@@ -13,7 +13,7 @@ from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
 from kmn_perception.doors.walls import Frame, NoWallError, find_walls
-from kmn_perception.experiments.doors.errors import DoorPlace
+from kmn_perception.evaluation.doors.errors import DoorPlace
 
 Found = DoorPlace | None
 

@@ -12,10 +12,11 @@ from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
+from kmn_perception.evaluation.doors.errors import DoorErrors, DoorPlace, compare, errors
+from kmn_perception.evaluation.doors.label import DoorLabel
+from kmn_perception.evaluation.doors.settings import DoorErrorSettings
 from kmn_perception.experiments.doors.baselines import BASELINES
-from kmn_perception.experiments.doors.errors import DoorErrors, DoorPlace, compare, errors
 from kmn_perception.experiments.doors.frames import DoorFrame
-from kmn_perception.experiments.doors.label import DoorLabel
 from kmn_perception.experiments.doors.masked_pipeline import masked_pipeline
 from kmn_perception.experiments.experiment import load_pipeline
 from kmn_perception.experiments.settings import ExperimentSettings
@@ -77,6 +78,7 @@ class DoorExperiment:
 
     def __init__(self, settings: ExperimentSettings, doors: DoorSettings) -> None:
         self.settings, self.doors = settings, doors
+        self._limits = DoorErrorSettings.load()
         self.model, self.network = RoomModel.load(MODEL), DoorFinder.load().network
         self.pipeline = load_pipeline()
 
@@ -120,7 +122,7 @@ class DoorExperiment:
     def _judge(self, estimate: DoorEstimate, frame: DoorFrame) -> Outcome:
         off = None
         if estimate.found and frame.label is not None:
-            off = errors(estimate, frame.label, self.model, self.settings.doors)
+            off = errors(estimate, frame.label, self.model, self._limits)
         return self._outcome(estimate.found, off)
 
     def _judge_place(self, place: DoorPlace | None, frame: DoorFrame) -> Outcome:
@@ -132,4 +134,4 @@ class DoorExperiment:
         return self._outcome(place is not None, off)
 
     def _outcome(self, found: bool, off: DoorErrors | None) -> Outcome:
-        return Outcome(found, off, found and (off is None or off.is_wrong(self.settings.doors)))
+        return Outcome(found, off, found and (off is None or off.is_wrong(self._limits)))

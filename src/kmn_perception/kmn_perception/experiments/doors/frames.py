@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.experiments.doors.label import DoorLabel, FrameDescription, read_description
+from kmn_perception.evaluation.doors.label import DoorLabel, FrameDescription, read_description
 from kmn_perception.experiments.labelled_frame import FrameError, by_number, size_text
 from kmn_perception.model.depth_image import PictureError, read_depth_image
 

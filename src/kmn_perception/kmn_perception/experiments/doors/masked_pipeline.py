@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.geometry import DOOR
 from kmn_perception.estimator import Status
-from kmn_perception.experiments.doors.errors import DoorPlace, door_place
+from kmn_perception.evaluation.doors.errors import DoorPlace, door_place
+from kmn_perception.evaluation.doors.label import DoorLabel
 from kmn_perception.experiments.doors.frames import DoorFrame
-from kmn_perception.experiments.doors.label import DoorLabel
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.room_model import RoomModel
 from kmn_perception.pipeline import MorphPipeline

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kmn_perception.experiments.doors.errors import UNITS, DoorErrors
+from kmn_perception.evaluation.doors.error_statistics import ERRORS, coverage, error_sizes, times
+from kmn_perception.evaluation.doors.errors import UNITS, DoorErrors
 from kmn_perception.experiments.doors.experiment import (
     MODES,
     WITH_COLOUR,
@@ -17,14 +16,8 @@ from kmn_perception.experiments.doors.experiment import (
     Outcome,
 )
 from kmn_perception.experiments.settings import ExperimentSettings
-from kmn_perception.experiments.statistics import Statistics, quantile
+from kmn_perception.experiments.statistics import Statistics
 
-# Keys of the results, and the quantities whose errors they hold.
-ERRORS = {
-    "edge_mm": ("left", "right"), "width_mm": ("width",), "top_mm": ("top",),
-    "yaw_deg": ("yaw",), "handle_up_mm": ("handle_up",), "handle_along_mm": ("handle_along",),
-    "opening_deg": ("opening",),
-}  # fmt: skip
 BASELINE_ERRORS = ("edge_mm", "width_mm", "yaw_deg")
 
 
@@ -49,21 +42,17 @@ def statistics(results: Sequence[DoorResult], settings: ExperimentSettings) -> S
 def _of_mode(results: Sequence[DoorResult], mode: str, settings: ExperimentSettings) -> Statistics:
     outcomes = [result.outcomes[mode] for result in results]
     off = [outcome.errors for outcome in outcomes if outcome.errors]
-    limit = NormalDist().inv_cdf(0.5 + 0.5 * settings.confidence)
-    ratios = np.concatenate([e.ratios[e.stated > 0.0] for e in off]) if off else np.empty(0)
-    known = ratios[np.isfinite(ratios)]
-    milliseconds = [1e3 * result.seconds[mode] for result in results]
     return {
         **_counts(results, outcomes),
-        **{key: _sizes(off, key) for key in ERRORS},
-        "coverage95": round(float((known < limit).mean()), 4) if known.size else None,
-        "milliseconds": {"median": quantile(milliseconds, 50), "p95": quantile(milliseconds, 95)},
+        **{key: error_sizes(off, key) for key in ERRORS},
+        "coverage95": coverage(off, settings.confidence),
+        "milliseconds": times([result.seconds[mode] for result in results]),
     }
 
 
 def _of_baseline(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> Statistics:
     off = [outcome.errors for outcome in outcomes if outcome.errors]
-    return {**_counts(results, outcomes), **{key: _sizes(off, key) for key in BASELINE_ERRORS}}
+    return {**_counts(results, outcomes), **{key: error_sizes(off, key) for key in BASELINE_ERRORS}}
 
 
 def _counts(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> Statistics:
@@ -77,14 +66,6 @@ def _counts(results: Sequence[DoorResult], outcomes: Sequence[Outcome]) -> Stati
         "negatives": is_there.count(False),
         "negatives_ok": sum(f and not there for f, there in zip(found, is_there, strict=True)),
     }
-
-
-def _sizes(off: Sequence[DoorErrors], key: str) -> dict[str, float | None]:
-    """Return median and 95th percentile of the sizes of errors."""
-    rows = [list(UNITS).index(name) for name in ERRORS[key]]
-    sizes: NDArray[np.float64] = np.abs([e.values[rows] for e in off]).ravel()
-    known = sizes[np.isfinite(sizes)].tolist()
-    return {"median": quantile(known, 50), "p95": quantile(known, 95)}
 
 
 def _of_frame(result: DoorResult) -> dict[str, Any]:

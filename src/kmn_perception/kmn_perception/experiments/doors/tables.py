@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from kmn_perception.command_line.columns import columns
-from kmn_perception.experiments.doors.errors import UNITS
+from kmn_perception.command_line.columns import NONE, columns, text
+from kmn_perception.evaluation.doors.error_statistics import DIGITS, HEADS, error_cells, pair
+from kmn_perception.evaluation.doors.errors import UNITS
 from kmn_perception.experiments.doors.experiment import (
     DEPTH_ALONE,
     WITH_COLOUR,
     WITHOUT_NETWORK,
     DoorResult,
 )
-from kmn_perception.experiments.doors.statistics import ERRORS
-from kmn_perception.experiments.statistics import NONE, Statistics, text
+from kmn_perception.experiments.statistics import Statistics
 
 SHOWN = ("left", "right", "width", "top", "yaw", "handle_up", "handle_along", "opening")
-DIGITS = {"mm": 1, "deg": 2}
 NAMES = {
     WITH_COLOUR: "depth and colour",
     WITHOUT_NETWORK: "the same without network",
@@ -58,8 +56,7 @@ def _row(result: DoorResult, mode: str) -> list[str]:
 
 def method_table(summary: Statistics) -> str:
     """Return a line for each mode and baseline: medians and 95th percentiles."""
-    heads = [key.rpartition("_")[0].replace("handle_", "") for key in ERRORS]
-    rows = [["median / 95 %", "found", "wrong", "not there", *heads, "in 95 %", "ms"]]
+    rows = [["median / 95 %", "found", "wrong", "not there", *HEADS.values(), "in 95 %", "ms"]]
     methods = {
         name: summary if mode == WITH_COLOUR else summary[mode] for mode, name in NAMES.items()
     }
@@ -71,18 +68,12 @@ def method_table(summary: Statistics) -> str:
                 f"{method['found']} of {doors}",
                 str(method["ok_and_wrong"]),
                 f"{method['negatives_ok']} of {method['negatives']}",
-                *(_pair(method.get(key), DIGITS[key.rpartition("_")[2]]) for key in ERRORS),
+                *error_cells(method),
                 text(method.get("coverage95"), 100.0, 0),
-                _pair(method.get("milliseconds"), 0),
+                pair(method.get("milliseconds"), 0),
             ]
         )
     return columns(rows)
-
-
-def _pair(value: dict[str, Any] | None, digits: int) -> str:
-    if value is None or value["median"] is None:
-        return NONE
-    return " / ".join(text(value[key], 1.0, digits) for key in ("median", "p95"))
 
 
 def in_view(results: Sequence[DoorResult]) -> str:

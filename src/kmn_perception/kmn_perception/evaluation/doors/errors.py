@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.geometry import DOOR, HEIGHT, WIDTH, propagate
-from kmn_perception.experiments.doors.label import DoorLabel, Edge
-from kmn_perception.experiments.settings import DoorExperimentSettings
+from kmn_perception.evaluation.doors.label import DoorLabel, Edge
+from kmn_perception.evaluation.doors.settings import DoorErrorSettings
 from kmn_perception.model.room_model import RoomModel
 
 MM = 1e3  # in a metre
@@ -74,15 +74,27 @@ class DoorErrors(NamedTuple):
         with np.errstate(divide="ignore", invalid="ignore"):  # what is stated to be exact
             return np.abs(self.values) / self.deviations
 
-    def is_wrong(self, settings: DoorExperimentSettings) -> bool:
+    def far_off(self, settings: DoorErrorSettings) -> tuple[str, ...]:
+        """Return the edges and the yaw that are not where they are said to be."""
+        limits = np.full(len(UNITS), np.inf)
+        limits[EDGES], limits[YAW] = MM * settings.wrong_edge, settings.wrong_yaw
+        return _names(np.abs(self.values) > limits)
+
+    def broken_promises(self, settings: DoorErrorSettings) -> tuple[str, ...]:
+        """Return the quantities whose errors are larger than their deviations allow."""
+        return _names(self.ratios > settings.wrong_deviations)
+
+    def is_wrong(self, settings: DoorErrorSettings) -> bool:
         """Return whether a promise is broken, or the door is not where it is said to be."""
-        edge = bool((np.abs(self.values[EDGES]) > MM * settings.wrong_edge).any())
-        yaw = bool(abs(self.values[YAW]) > settings.wrong_yaw)
-        return edge or yaw or bool((self.ratios > settings.wrong_deviations).any())
+        return bool(self.far_off(settings) or self.broken_promises(settings))
+
+
+def _names(which: NDArray[np.bool_]) -> tuple[str, ...]:
+    return tuple(name for name, is_so in zip(UNITS, which, strict=True) if is_so)
 
 
 def errors(
-    estimate: DoorEstimate, label: DoorLabel, model: RoomModel, settings: DoorExperimentSettings
+    estimate: DoorEstimate, label: DoorLabel, model: RoomModel, settings: DoorErrorSettings
 ) -> DoorErrors:
     """Compare an estimate with a label; deviations follow from its covariance by derivatives."""
 
@@ -172,7 +184,7 @@ def _across(ends: NDArray[np.float64], edge: Edge | None, label: DoorLabel) -> f
     return float(((ends - feet) @ label.right).mean())
 
 
-def label_deviations(label: DoorLabel, settings: DoorExperimentSettings) -> NDArray[np.float64]:
+def label_deviations(label: DoorLabel, settings: DoorErrorSettings) -> NDArray[np.float64]:
     """Return the standard deviations (Q,) of the label, in the units of ``UNITS``."""
     handle = [
         MM * float(np.linalg.norm(label.handle_deviation * axis))

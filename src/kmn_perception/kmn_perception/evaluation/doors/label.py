@@ -139,7 +139,11 @@ def read_description(file: Path) -> FrameDescription:
         values = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise Section({}, file.name).error(f"not JSON: {error}") from error
-    section = Section(values, file.name)
+    return describe(Section(values, file.name))
+
+
+def describe(section: Section) -> FrameDescription:
+    """Return the description of a frame from what its file says; see `read_description`."""
     intrinsics = section.section("intrinsics")
     matrix = intrinsics.table("K", 3)
     if len(matrix) != 3:

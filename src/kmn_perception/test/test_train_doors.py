@@ -47,7 +47,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     values["width"] = 16
     values["data"] |= {"rooms": 6, "shard": 2, "validation": 0.34}
     values["augmentation"]["columns"] = 96
-    values["fit"] |= {"epochs": 16, "batch": 4}
+    values["fit"] |= {"epochs": 12, "batch": 4, "learning_rate": 0.005}
     file = tmp_path_factory.mktemp("config") / "small.yaml"
     file.write_text(yaml.safe_dump(values), encoding="utf-8")
     return file

@@ -28,6 +28,8 @@ from kmn_perception.doors.walls import Frame
 _VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
 _HIDDEN_REVEAL = (0.0, 0.1)
 _PROUD = (0.8, 0.2)
+_SWUNG = 0.06  # metres that an open panel's edge is away from its frame:
+_OWN, _UNKNOWN = (0.75, 0.25), (0.5, 0.5)  # then its own is seen, or nobody knows
 
 
 class Measurement(NamedTuple):
@@ -171,6 +173,8 @@ def _gather(
         outward = direction < 0.0 if i == 0 else direction > 0.0
         reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
         told = _PROUD if depth < 0.0 else reveal
+        if surfaces.opening != 0.0 and abs(depth) > _SWUNG:
+            told = _OWN if outward or depth < 0.0 else _UNKNOWN
         values[7 + i], deviations[7 + i] = told
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]

@@ -117,7 +117,7 @@ def test_open_door_opens_the_door_and_tells_the_phases(client: DoorClient, domai
         "wait", "plan", "reach", "grasp", "press", "open"
     ]  # fmt: skip
     assert last.startswith("the door is open by -0.8")
-    assert client.doors[-1].position[0] < -0.75
+    client.wait_for_door(-0.85)
 
 
 @pytest.mark.usefixtures("skill")

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from kmn_perception.doors import measuring
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.door_finder import DoorFinder
+from kmn_perception.doors.handle import Handle, find_handle
 from kmn_perception.doors.walls import Frame
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.depth_sensor import DepthSensor
@@ -109,6 +111,27 @@ def test_what_is_found_lies_within_what_is_stated(condition: str) -> None:
     assert sum(status in seen for status in found) >= 2, found
     if condition == "no handle":
         assert DoorStatus.OK not in found
+
+
+def test_a_handle_beside_the_panel_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is seen too far from the edge is no handle: its place and its side are not stated."""
+    room = sample_room(1, CAMERA, settings(), "door")
+    frame = render(room, 1)
+    seen = finder().find(frame)
+    assert seen.status is DoorStatus.OK
+
+    def beside(*given: Any) -> Handle | None:
+        handle = find_handle(*given)
+        left, right = given[1]
+        inner = left + 0.35 if handle and handle.side == "left" else right - 0.35
+        return handle and handle._replace(s=inner)
+
+    monkeypatch.setattr(measuring, "find_handle", beside)
+    found = finder().find(frame)
+    assert found.status is not DoorStatus.OK
+    assert found.handle_side == ""
+    assert found.deviation("handle_y") > 0.3
+    assert found.deviation("handle_z") > 0.1
 
 
 def test_a_door_that_is_flush_is_not_seen_in_depth_alone() -> None:

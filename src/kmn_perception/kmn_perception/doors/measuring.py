@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.edges import measure_edge
 from kmn_perception.doors.geometry import (
+    DOOR,
+    HANDLE_INSET,
     DoorShape,
     View2d,
     door_shape,
@@ -45,8 +48,6 @@ class Measurement(NamedTuple):
         Of the left and right edge along the wall, metres, as the image tells them.
     handle
         None where it is not seen.
-    floor_seen
-        Whether the floor tells the camera's height.
     """
 
     candidate: Candidate
@@ -58,7 +59,6 @@ class Measurement(NamedTuple):
     covariance: NDArray[np.float64]
     inverse_height: float
     edge_deviations: tuple[float, float]
-    floor_seen: bool
 
 
 def measure(
@@ -81,13 +81,16 @@ def measure(
         panel, (on_panel[0], on_panel[1]), frame.depth, frame.grey, frame.camera,
         settings.handle, settings.lines.step_noise, _hint(candidate, panel),
     )  # fmt: skip
-    measured, covariance = _gather(at, panel, surfaces, edges, lintel, handle, floor, settings)
     look = View2d(at.right[2], -at.normal[2])
-    handle_left = handle is not None and handle.side == "left"
     ajar = surfaces.opening != 0.0
-    values, spread = propagate(
-        lambda m: door_values(m, handle_left, ajar, look), measured, covariance
-    )
+    for found in (handle, None):
+        measured, covariance = _gather(at, panel, surfaces, edges, lintel, found, floor, settings)
+        handle_left = found is not None and found.side == "left"
+        values_of = partial(door_values, handle_left=handle_left, ajar=ajar, look=look)
+        values, spread = propagate(values_of, measured, covariance)
+        handle = found
+        if found is None or _is_on_panel(values, spread, settings):
+            break  # else nothing that this handle told may remain
     shape = door_shape(measured, handle_left, ajar)
     return Measurement(
         candidate,
@@ -99,8 +102,17 @@ def measure(
         spread,
         float(measured[4]),
         (edges[0][1] * at.distance, edges[1][1] * at.distance),
-        floor,
     )
+
+
+def _is_on_panel(
+    values: NDArray[np.float64], covariance: NDArray[np.float64], settings: DoorSettings
+) -> bool:
+    """Return whether a handle is as far from the edge as handles are, within its deviation."""
+    i = DOOR.index("handle_y")
+    low, high = settings.handle.inset
+    inset, slack = HANDLE_INSET + values[i], min(2.0 * np.sqrt(covariance[i, i]), low)
+    return bool(low - slack <= inset <= high + slack)
 
 
 def _is_possible(
@@ -163,13 +175,11 @@ def _gather(
     wall_line, panel_line = surfaces.values[WALL], surfaces.values[PANEL]
     values, deviations = np.zeros(13), np.zeros(13)
     values[:5] = surfaces.values[:5]
-    recess = []
     for i, (direction, deviation) in enumerate(edges):
         values[5 + i], deviations[5 + i] = direction, deviation
         ray = np.array([direction, 1.0])
         point = ray / (panel_line @ ray)
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
-        recess.append(depth)
         outward = direction < 0.0 if i == 0 else direction > 0.0
         reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
         told = _PROUD if depth < 0.0 else reveal

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.geometry import DOOR, HANDLE_INSET, WIDTH
+from kmn_perception.doors.geometry import WIDTH
 from kmn_perception.doors.measuring import Measurement
 from kmn_perception.doors.proposals import edge_probability
 from kmn_perception.doors.settings import DoorSettings
@@ -17,7 +17,7 @@ from kmn_perception.doors.wall_view import WallFrame
 def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
     """Return the estimate of a measured candidate, with what it is worth."""
     reason = _refusal(found, settings)
-    handle = found.handle if _is_on_panel(found, settings) else None
+    handle = found.handle
     if reason:
         status = DoorStatus.NO_DOOR
     elif doubt := _doubt(found, settings):
@@ -137,15 +137,6 @@ def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
     recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
     deep = bool(recess > settings.verdict.min_step * deviation)
     return found.surfaces.opening != 0.0 or deep
-
-
-def _is_on_panel(found: Measurement, settings: DoorSettings) -> bool:
-    """Return whether the handle is as far from the edge as handles are, within its deviation."""
-    i = DOOR.index("handle_y")
-    inset, slack = HANDLE_INSET + found.values[i], 2.0 * np.sqrt(found.covariance[i, i])
-    low, high = settings.handle.inset
-    slack = min(slack, low)
-    return bool(low - slack <= inset <= high + slack)
 
 
 def _where(found: Measurement) -> str:

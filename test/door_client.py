@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -28,6 +30,7 @@ from kmn_sim.ros.sim_node import SimNode
 SEED = 3  # of a door that is wholly in view
 SPEED = 4.0  # simulated seconds in one second
 CAMERA_RATE = 0.5  # frames a simulated second
+ALL = 1000  # messages that wait on a busy machine; of states only the newest one does
 SILENCE = 2.0  # seconds after which a slow machine has perceived all
 PULL = {"handle_angle": -0.7, "door_angle": -0.9}
 
@@ -43,18 +46,20 @@ class DoorClient(GraphClient):
         self.paths: list[list[Marker]] = []
         self.feedback: list[OpenDoor.Feedback] = []
         self.perceived: list[MorphingParameters] = []
-        for kind, name, kept in (
-            (JointState, "joint_states", self.joints),
-            (JointState, "door_state", self.doors),
-            (JointTrajectory, "joint_trajectory", self.sent),
-            (MorphingParameters, "morphing_parameters", self.perceived),
+        for kind, name, kept, depth in (
+            (JointState, "joint_states", self.joints, 1),
+            (JointState, "door_state", self.doors, 1),
+            (JointTrajectory, "joint_trajectory", self.sent, ALL),
+            (MorphingParameters, "morphing_parameters", self.perceived, ALL),
         ):
-            self.create_subscription(kind, name, kept.append, 10)
+            self.create_subscription(kind, name, kept.append, depth)
         self.create_subscription(MarkerArray, "planned_path", self._keep_path, 10)
         self.parameters = self.create_publisher(MorphingParameters, "morphing_parameters", 10)
         self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
         self.reset = self.create_client(Trigger, "reset")
-        self.action = ActionClient(self, OpenDoor, "open_door")
+        self.action = ActionClient(
+            self, OpenDoor, "open_door", feedback_sub_qos_profile=QoSProfile(depth=ALL)
+        )
         self._simulator_setting = self.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )
@@ -78,6 +83,18 @@ class DoorClient(GraphClient):
 
     def stop_simulator(self) -> None:
         self._simulator.close()
+
+    @contextmanager
+    def pace(self, factor: float) -> Iterator[None]:
+        """Run the simulator at another real-time factor.
+
+        A slow one leaves time for a cancellation to come before the robot is elsewhere.
+        """
+        assert self.set_simulator(real_time_factor=factor).successful
+        try:
+            yield
+        finally:
+            assert self.set_simulator(real_time_factor=SPEED).successful
 
     def set_simulator(self, **values: Any) -> SetParametersResult:
         """Set parameters of the simulator, all or none."""
@@ -141,9 +158,13 @@ class DoorClient(GraphClient):
         assert result.door_angle < -0.8
         self.wait_for_door(result.door_angle)
 
+    def wait_for_hold(self) -> None:
+        """Wait until the last thing sent is to hold; it may come later than the result."""
+        self.graph.wait_for(lambda: self.sent and self.sent[-1].points == [])
+
     def assert_it_holds(self) -> None:
         """Assert that the last thing sent was to hold, and that the robot does."""
-        assert self.sent[-1].points == []
+        self.wait_for_hold()
         time.sleep(0.1)
         before = self.positions()
         time.sleep(0.3)

@@ -39,9 +39,10 @@ class GoalClient:
         return None
 
     def feed_back(self, feedback: Feedback) -> None:
-        """Publish what is being done, but not more often than once in a period for each phase."""
+        """Publish what is being done: each phase, its end, and in between once in a period."""
         now = time.monotonic()
-        if feedback.phase == self._phase and now - self._fed_back < FEEDBACK_PERIOD:
+        recent = feedback.phase == self._phase and now - self._fed_back < FEEDBACK_PERIOD
+        if recent and feedback.progress < 1.0:
             return
         self._phase, self._fed_back = feedback.phase, now
         self._statistics.enter(feedback.phase)

@@ -17,7 +17,7 @@ from kmn_perception.doors.surfaces import (
     angle,
     fit_surfaces,
 )
-from kmn_perception.doors.upright import find_camera_height, find_up
+from kmn_perception.doors.upright import HeightSource, find_camera_height, find_up
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.model.camera import Camera
 
@@ -148,10 +148,15 @@ def recessed(yaw: float, recess: float, turn: float = 0.0) -> np.ndarray:
 EDGES = (-0.45 / 2.0, 0.45 / 2.0)
 
 
-def fit(depth: np.ndarray, yaw: float, offset: float = SETTINGS.calibration.offset) -> Surfaces:
+def fit(
+    depth: np.ndarray,
+    yaw: float,
+    offset: float = SETTINGS.calibration.offset,
+    source: HeightSource = HeightSource.SEEN,
+) -> Surfaces:
     frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
     calibration = SETTINGS.calibration._replace(offset=offset)
-    surfaces = fit_surfaces(blocks_of(depth), frame, EDGES, True, calibration, SETTINGS.fit)
+    surfaces = fit_surfaces(blocks_of(depth), frame, EDGES, source, calibration, SETTINGS.fit)
     assert surfaces is not None
     return surfaces
 
@@ -195,5 +200,21 @@ def test_what_is_not_measured_has_no_fit() -> None:
     depth[:, 200:440] = 0.0
     frame = WallFrame.of(wall(0.0, 2.0), UP, HEIGHT)
     settings = replace(SETTINGS.fit)
-    found = fit_surfaces(blocks_of(depth), frame, EDGES, True, SETTINGS.calibration, settings)
+    found = fit_surfaces(
+        blocks_of(depth), frame, EDGES, HeightSource.SEEN, SETTINGS.calibration, settings
+    )
     assert found is None
+
+
+def test_the_foot_of_a_wall_is_no_floor() -> None:
+    """Where the floor before it is not measured, the wall's lowest blocks tell no height."""
+    depth = recessed(0.2, 0.04)
+    rays = camera().rays(*np.meshgrid(np.arange(640.0), np.arange(480.0)))
+    depth[rays @ floor() > rays @ wall(0.2, 2.0)] = 0.0
+    deviations = []
+    for source in (HeightSource.SEEN, HeightSource.GIVEN):
+        surfaces = fit(depth, 0.2, source=source)
+        assert 1.0 / surfaces.values[FLOOR] == pytest.approx(HEIGHT, abs=0.005)
+        deviations.append(HEIGHT**2 * np.sqrt(surfaces.covariance[FLOOR, FLOOR]))
+    assert deviations[0] > 0.03
+    assert deviations[1] == pytest.approx(0.01, abs=0.002)  # metres; a pose that is stated

@@ -14,6 +14,7 @@ from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.proposals import with_proposals
 from kmn_perception.doors.settings import Calibration, DoorSettings
+from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.doors.wall_view import WallView
@@ -64,7 +65,7 @@ class DoorFinder:
         except NoWallError as error:
             return DoorEstimate.none(str(error))
         best = self._search(frame, walls)
-        if best.handle_side and not walls.floor_seen:
+        if best.handle_side and walls.height_source is HeightSource.USUAL:
             # By the handle's usual height the camera is somewhere else above the floor.
             walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
             best = self._search(frame, walls)
@@ -86,7 +87,7 @@ class DoorFinder:
             bar = max((door.score for door in found if door.found), default=-np.inf)
             if candidate.score + bonus < bar:
                 break  # neither this nor a later one can be as good
-            measurement = measure(frame, walls.blocks, candidate, walls.floor_seen, settings)
+            measurement = measure(frame, walls.blocks, candidate, walls.height_source, settings)
             if measurement is not None:
                 found.append(judge(measurement, settings))
         return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")

@@ -25,6 +25,7 @@ from kmn_perception.doors.lintel import Lintel, find_lintel
 from kmn_perception.doors.proposals import handle_of
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
+from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.doors.walls import Frame
 
@@ -62,13 +63,13 @@ class Measurement(NamedTuple):
 
 
 def measure(
-    frame: Frame, blocks: Blocks, candidate: Candidate, floor: bool, settings: DoorSettings
+    frame: Frame, blocks: Blocks, candidate: Candidate, height: HeightSource, settings: DoorSettings
 ) -> Measurement | None:
     """Measure a candidate; None where wall or panel are hardly seen."""
     at = candidate.view.frame
     edges = [measure_edge(candidate, side, settings) for side in ("left", "right")]
     directions = edges[0][0], edges[1][0]
-    surfaces = fit_surfaces(blocks, at, directions, floor, settings.calibration, settings.fit)
+    surfaces = fit_surfaces(blocks, at, directions, height, settings.calibration, settings.fit)
     if surfaces is None or not _is_possible(surfaces, directions, settings):
         return None
     heights = _lintel_heights(at, directions, surfaces, settings)
@@ -84,7 +85,7 @@ def measure(
     look = View2d(at.right[2], -at.normal[2])
     ajar = surfaces.opening != 0.0
     for found in (handle, None):
-        measured, covariance = _gather(at, panel, surfaces, edges, lintel, found, floor, settings)
+        measured, covariance = _gather(at, panel, surfaces, edges, lintel, found, height, settings)
         handle_left = found is not None and found.side == "left"
         values_of = partial(door_values, handle_left=handle_left, ajar=ajar, look=look)
         values, spread = propagate(values_of, measured, covariance)
@@ -168,7 +169,7 @@ def _gather(
     edges: list[tuple[float, float]],
     lintel: Lintel,
     handle: Handle | None,
-    floor: bool,
+    source: HeightSource,
     settings: DoorSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what was measured (13,) and its covariance, see `MEASURED`."""
@@ -205,7 +206,7 @@ def _gather(
     over = np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0])
     far = 1.0 / float(wall_line @ over)
     rise = None if lintel.z is None else (lintel.z - at.height) / at.distance
-    if not floor:
+    if source is HeightSource.USUAL:
         # The usual height of handle or top tells the floor's, and no more than that.
         height, slack = settings.prior.camera_height
         if handle is not None:

@@ -56,8 +56,9 @@ class FitSettings:
         Largest offset of wall and panel from the plane that was found, inverse depth, 1/m.
     inlier
         Pixel noises.
-    tilt
-        Standard deviation of the vertical, radians.
+    tilt, given_height, seen_height
+        Standard deviations of the vertical, radians, and of the camera's height before the fit,
+        metres: that of a pose that is given, and that of the floor that was found.
     closed
         Standard deviation of a closed panel's angle to its wall, radians.
     agree
@@ -80,6 +81,8 @@ class FitSettings:
     reach: Positive
     inlier: Positive
     tilt: Positive
+    given_height: Positive
+    seen_height: Positive
     closed: Positive
     agree: Positive
     ajar: tuple[float, float]

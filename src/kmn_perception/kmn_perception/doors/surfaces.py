@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.settings import Calibration, FitSettings
+from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 
 WALL, PANEL, FLOOR, TILT, OFFSET, WARP = slice(0, 2), slice(2, 4), 4, slice(5, 7), 7, slice(7, 11)
@@ -100,7 +101,7 @@ def fit_surfaces(
     blocks: Blocks,
     frame: WallFrame,
     edges: tuple[float, float],
-    floor: bool,
+    height: HeightSource,
     calibration: Calibration,
     settings: FitSettings,
 ) -> Surfaces | None:
@@ -110,8 +111,8 @@ def fit_surfaces(
     ----------
     edges
         Directions of the left and right edge, metres to the right per metre away.
-    floor
-        Whether the frame's height is known from the floor.
+    height
+        How the frame's height above the floor is known.
     calibration
         Of the sensor.
     """
@@ -120,14 +121,14 @@ def fit_surfaces(
     ahead = axes[:, 1] > 0.0
     away = np.where(ahead, axes[:, 1], np.inf)
     side = axes[:, 0] / away * frame.distance
-    height = axes[:, 2] / away * frame.distance + frame.height
+    z = axes[:, 2] / away * frame.distance + frame.height
     left, right = (edge * frame.distance for edge in edges)
-    level = ahead & (height > _LOW) & (height < _HIGH)
+    level = ahead & (z > _LOW) & (z < _HIGH)
     frame_left, frame_right = left - settings.frame, right + settings.frame
     beside = (side < frame_left) & (side > frame_left - settings.beside)
     beside |= (side > frame_right) & (side < frame_right + settings.beside)
     inside = (side > left + settings.margin) & (side < right - settings.margin)
-    inside &= level & (height < _PANEL_HIGH)
+    inside &= level & (z < _PANEL_HIGH)
     offset = inverse - rays @ frame.vector
     near = valid & (np.abs(offset) < settings.reach)
 
@@ -141,10 +142,13 @@ def fit_surfaces(
     if wall is None or panel is None:
         return None
     surfaces = [wall_seen, panel_seen]
-    if floor:
-        surfaces.append(seen(FLOOR, valid & (axes[:, 2] < 0.0), settings.floor_noise))
+    if height is not HeightSource.USUAL:
+        before = offset > 2.0 * settings.inlier * settings.pixel_noise  # no foot of wall or panel
+        below = valid & (axes[:, 2] < 0.0)
+        surfaces.append(seen(FLOOR, below & before, settings.floor_noise))
     start = np.concatenate((wall, panel, [1.0 / frame.height], np.zeros(SIZE - 5)))
-    values, covariance, counts = _solve(surfaces, start, None, calibration, settings)
+    believed = _believed(start, height, calibration, settings)
+    values, covariance, counts = _solve(surfaces, start, believed, None, settings)
     if min(counts[:2]) < settings.min_blocks:
         return None
     turn, deviation = _turn(values, covariance, settings)
@@ -152,7 +156,7 @@ def fit_surfaces(
     opening = turn if abs(turn) > max(least, deviations * deviation) else 0.0
     if abs(turn) < settings.agree * deviation:
         closed = settings.closed
-        values, covariance, counts = _solve(surfaces, values, closed, calibration, settings)
+        values, covariance, counts = _solve(surfaces, values, believed, closed, settings)
     around = valid & level & beside & (offset < settings.reach)
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)
@@ -169,6 +173,27 @@ def fit_surfaces(
         panel_visible=float(unhidden.sum() / max(1, inside.sum())),
         opening=opening,
     )
+
+
+def _believed(
+    start: NDArray[np.float64],
+    height: HeightSource,
+    calibration: Calibration,
+    settings: FitSettings,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what is known before the fit: the information (12, 12), and the values (12,)."""
+    slope = calibration.slope
+    deviations = np.full(SIZE, np.inf)
+    deviations[TILT] = settings.tilt
+    deviations[WARP] = calibration.offset, slope, slope, calibration.bend
+    deviations[FLOOR_OFFSET] = calibration.floor
+    if height is not HeightSource.USUAL:
+        given = height is HeightSource.GIVEN
+        deviation = settings.given_height if given else settings.seen_height
+        deviations[FLOOR] = deviation * start[FLOOR] ** 2
+    expected = np.zeros(SIZE)
+    expected[FLOOR] = start[FLOOR]
+    return np.diag(deviations**-2.0), expected
 
 
 def angle(line: NDArray[np.float64]) -> float:
@@ -239,22 +264,23 @@ def _rows(
 def _solve(
     surfaces: Sequence[_Seen],
     start: NDArray[np.float64],
+    believed: tuple[NDArray[np.float64], NDArray[np.float64]],
     closed: float | None,
-    calibration: Calibration,
     settings: FitSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[int]]:
-    """Return values, covariance, and how many blocks lie on each surface."""
+    """Return values, covariance, and how many blocks lie on each surface.
+
+    Parameters
+    ----------
+    believed
+        Information (12, 12) of what is known before, and the values (12,) that it is about.
+    """
     values = start.copy()
     reach = settings.inlier * settings.pixel_noise
-    prior = np.zeros((SIZE, SIZE))
-    prior[TILT, TILT] = np.eye(2) / settings.tilt**2
-    slope = calibration.slope
-    deviations = np.array([calibration.offset, slope, slope, calibration.bend])
-    prior[WARP, WARP] = np.diag(deviations**-2.0)
-    prior[FLOOR_OFFSET, FLOOR_OFFSET] = calibration.floor**-2.0
+    prior, expected = believed
     counts: list[int] = []
     for _ in range(_ROUNDS):
-        information, right_side, counts = prior.copy(), np.zeros(SIZE), []
+        information, right_side, counts = prior.copy(), prior @ expected, []
         for surface in surfaces:
             rows = surface.derivatives(values)
             near = np.abs(rows @ values - surface.inverse) < reach
@@ -262,7 +288,7 @@ def _solve(
             information += rows.T @ rows
             right_side += rows.T @ surface.inverse[near] / surface.noise
             counts.append(int(near.sum()))
-        if len(counts) < 3 or not counts[2]:  # without a floor the height stays where it is
+        if not information[FLOOR, FLOOR]:  # without a floor the height stays where it is
             information[FLOOR, FLOOR] += _FIRM
             right_side[FLOOR] += _FIRM * start[FLOOR]
         if closed is not None:

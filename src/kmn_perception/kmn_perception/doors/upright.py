@@ -7,6 +7,7 @@ vertical vanishing point to a degree, and line segments tell it to a few tenths.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import Enum, auto
 
 import cv2
 import numpy as np
@@ -19,6 +20,14 @@ from kmn_perception.model.camera import Camera
 _REWEIGHTINGS = 12
 _UNDER, _FEW = 0.1, 0.4  # lower by this part of the height; how much of it reflections are
 _IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+class HeightSource(Enum):
+    """How the camera's height above the floor is known: as given, as seen, or as it usually is."""
+
+    GIVEN = auto()
+    SEEN = auto()
+    USUAL = auto()
 
 
 def line_segments(

@@ -13,7 +13,12 @@ from kmn_perception.doors.camera_check import find_contradiction
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.upright import find_camera_height, find_up, line_segments
+from kmn_perception.doors.upright import (
+    HeightSource,
+    find_camera_height,
+    find_up,
+    line_segments,
+)
 from kmn_perception.doors.wall_view import WallFrame, WallView, view_wall
 from kmn_perception.model.camera import Camera
 
@@ -55,9 +60,9 @@ class Walls(NamedTuple):
     up
         (3,) the vertical, optical frame.
     height
-        Of the camera above the floor, metres; a usual one where the floor is not seen.
-    floor_seen
-        Whether it is.
+        Of the camera above the floor, metres.
+    height_source
+        How it is known.
     blocks, planes
         The frame's inverse depths, and all planes among them.
     views
@@ -66,7 +71,7 @@ class Walls(NamedTuple):
 
     up: NDArray[np.float64]
     height: float
-    floor_seen: bool
+    height_source: HeightSource
     blocks: Blocks
     planes: list[Plane]
     views: list[WallView]
@@ -96,13 +101,14 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
     if not walls:
         raise NoWallError("no wall is seen")
-    floor = frame.height
-    if floor is None:
-        floor = _camera_height(blocks, up, walls, settings)
-    height = settings.prior.handle_height[0] if floor is None else floor
+    height, source = frame.height, HeightSource.GIVEN
+    if height is None:
+        height, source = _camera_height(blocks, up, walls, settings), HeightSource.SEEN
+    if height is None:
+        height, source = settings.prior.handle_height[0], HeightSource.USUAL
     frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
     views = _views(frames, frame, settings)
-    return Walls(up, height, floor is not None, blocks, planes, views)
+    return Walls(up, height, source, blocks, planes, views)
 
 
 def _views(frames: Sequence[WallFrame], frame: Frame, settings: DoorSettings) -> list[WallView]:

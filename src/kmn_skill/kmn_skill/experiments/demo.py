@@ -13,7 +13,7 @@ from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
-from kmn_skill.experiments.evaluate import NOISES, random_doors, random_rooms
+from kmn_skill.experiments.evaluate import NOISES, random_rooms
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
@@ -21,8 +21,8 @@ from kmn_skill.experiments.settings import MODES, Experiment
 
 def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     """Open one random door and tell how it went; return whether it is open."""
-    model = KinematicModel.load(experiment.model)
-    values = random_doors(model, 1, options.seed)[0]
+    model = experiment.kinematic_model(options.room)
+    values = experiment.random_doors(options.room, 1, options.seed)[0]
     goal, pace = experiment.goal(options.mode), experiment.demo
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
     sim["renderer"] = "software"  # whose light is ours
@@ -31,7 +31,7 @@ def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     strip = recording.with_suffix(".png")
     nodes = "sim_node, morph_node" if options.parameters == "perceived" else "sim_node"
     print(f"starting {nodes} and skill_node (20 seconds)", flush=True)
-    with DoorSystem(sim, options.parameters, experiment.timeouts) as system:
+    with DoorSystem(sim, options.parameters, experiment, options.room) as system:
         system.show(values, options.mode, random_rooms(options, 1)[0])
         system.record(recording, experiment.recording.rate)
         print(f"opening a door (seed {options.seed}, {options.mode}):", flush=True)
@@ -81,7 +81,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--room",
         action="store_true",
-        help="the door stands in a room; with true parameters, as perception needs a bare door",
+        help="the door stands in a room, and is seen by depth and image",
     )
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(
@@ -90,10 +90,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         default=Path("outputs/door_demo"),
         help="folder of recording and pictures",
     )
-    options = parser.parse_args(argv)
-    if options.room and options.parameters != "true":
-        parser.error("a door in a room is not perceived yet: --room needs --parameters true")
-    return options
+    return parser.parse_args(argv)
 
 
 def main() -> int:

@@ -25,7 +25,7 @@ from kmn_perception.configuration import resources
 from kmn_perception.configuration.settings import Count, NonNegative, load_settings
 from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
 from kmn_skill.execution.goal import Goal
-from kmn_skill.experiments.settings import Timeouts
+from kmn_skill.experiments.settings import Experiment
 from kmn_skill.planning.layout import HINGE
 from kmn_skill.planning.surroundings import WALL
 
@@ -92,8 +92,10 @@ class DoorSystem:
         Parameters of sim_node.
     source
         Where skill_node takes the door from, one of ``SOURCES``.
-    timeouts
-        How long to wait for what.
+    experiment
+        Models of the doors, and how long to wait for what.
+    in_rooms
+        Whether the doors stand in rooms, and are perceived by depth and image.
 
     Raises
     ------
@@ -101,13 +103,18 @@ class DoorSystem:
         If a node ends or does not answer; by all methods.
     """
 
-    def __init__(self, sim: dict[str, Any], source: str, timeouts: Timeouts) -> None:
-        self._sim, self._source, self._timeouts = sim, source, timeouts
+    def __init__(
+        self, sim: dict[str, Any], source: str, experiment: Experiment, in_rooms: bool
+    ) -> None:
+        model = experiment.room.model if in_rooms else experiment.model
+        self._sim = {**sim, "model": model, "image": in_rooms}
+        self._source, self._timeouts, self._in_rooms = source, experiment.timeouts, in_rooms
         self._patience = Patience.load()
         self._processes: list[NodeProcess] = []
         self._stack = ExitStack()
         self._truth: MorphingParameters | None = None
         self._taken: list[MorphingParameters] = []
+        self._perceives = False
         self._hinge = float("nan")
 
     def __enter__(self) -> DoorSystem:
@@ -175,13 +182,16 @@ class DoorSystem:
 
     def _nodes(self) -> list[tuple[str, str, dict[str, Any], list[str]]]:
         """Return packages, executables, parameters and remappings of the nodes that are needed."""
-        simulated, door = {"use_sim_time": True}, f"morphing_parameters:={SOURCES[self._source]}"
+        simulated = {"use_sim_time": True, "model": self._sim["model"]}
+        door = f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, str, dict[str, Any], list[str]]] = [
             ("kmn_sim", "sim_node", {**self._sim, "publish_clock": True}, []),
             ("kmn_skill", "skill_node", {**simulated, **self._skill_parameters()}, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
+            if self._in_rooms:  # the simulated sensor's depth is not off as a whole
+                morph["calibration"] = "calibrated"
             nodes.append(("kmn_perception", "morph_node", morph, []))
         return nodes
 
@@ -225,13 +235,14 @@ class DoorSystem:
             and self._knowing.service_is_ready()
             and self._action.server_is_ready()
             and self._truth is not None
-            and len(self._taken) > 0
+            and self._perceives
         )
 
     def _on_truth(self, message: MorphingParameters) -> None:
         self._truth = message
 
     def _on_parameters(self, message: MorphingParameters) -> None:
+        self._perceives = True  # be it a door or not
         if message.status == MorphingParameters.OK:
             self._taken.append(message)
 

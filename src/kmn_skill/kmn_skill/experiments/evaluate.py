@@ -15,7 +15,6 @@ from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import SOURCES, DoorSystem, Room
 from kmn_skill.experiments.film_strip import save_strip
@@ -60,11 +59,6 @@ class Trial(NamedTuple):
         return not math.isnan(self.clearance)
 
 
-def random_doors(model: KinematicModel, count: int, seed: int) -> NDArray[np.float64]:
-    """Return morphing parameters (count, n + m) over the whole limits."""
-    return model.sample(np.random.default_rng(seed), count)
-
-
 def random_rooms(options: argparse.Namespace, count: int) -> list[Room] | list[None]:
     """Return the rooms of so many doors, or none of them if they stand alone."""
     if not options.room:
@@ -75,14 +69,13 @@ def random_rooms(options: argparse.Namespace, count: int) -> list[Room] | list[N
 
 def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
     """Open all doors, one after the other."""
-    model = KinematicModel.load(experiment.model)
-    doors = random_doors(model, options.doors, options.seed)
+    doors = experiment.random_doors(options.room, options.doors, options.seed)
     rooms = random_rooms(options, options.doors)
     pace = experiment.evaluation
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
     trials: list[Trial] = []
     with (
-        DoorSystem(sim, options.parameters, experiment.timeouts) as system,
+        DoorSystem(sim, options.parameters, experiment, options.room) as system,
         tqdm(doors, unit="door") as bar,
     ):
         for values, room in zip(bar, rooms, strict=True):
@@ -188,7 +181,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--room",
         action="store_true",
-        help="the doors stand in rooms, whose wall the robot knows as it knows the true parameters",
+        help="the doors stand in rooms, and are seen by depth and image",
     )
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of doors and noise")
     parser.add_argument("--json", type=output_file, help="file to write the result to")

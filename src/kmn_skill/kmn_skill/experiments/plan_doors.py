@@ -15,7 +15,6 @@ from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.experiments.settings import MODES, Experiment, random_recesses
 from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
@@ -101,8 +100,8 @@ def main() -> int:
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     options = parser.parse_args()
     experiment = Experiment.load()
-    setup = PlanningSetup.load(KinematicModel.load(experiment.model))
-    doors = setup.model.sample(np.random.default_rng(options.seed), options.doors)
+    setup = PlanningSetup.load(experiment.kinematic_model(options.room))
+    doors = experiment.random_doors(options.room, options.doors, options.seed)
     recesses = iter(random_recesses(options.mode, options.doors, options.seed))
 
     def request(values: NDArray[np.float64]) -> PlanRequest:

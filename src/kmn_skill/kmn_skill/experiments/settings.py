@@ -10,6 +10,7 @@ from pydantic import Field
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.settings import Interval, NonNegative, Positive, load_settings
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.goal import Goal
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
@@ -106,13 +107,22 @@ class PrototypeGuesses(NamedTuple):
     walled: WalledGuesses
 
 
+class RoomDoors(NamedTuple):
+    """Doors in rooms: their kinematic model, and the limits of what is drawn, metres and radians."""
+
+    model: str
+    limits: dict[str, Interval]
+
+
 class Experiment(NamedTuple):
     """What is done with each door.
 
     Attributes
     ----------
     model
-        Kinematic model of the doors.
+        Kinematic model of doors that stand alone.
+    room
+        Doors that stand in rooms.
     handle_angle, door_angle
         Of the goal, radians; the door's without sign.
     opened
@@ -126,6 +136,7 @@ class Experiment(NamedTuple):
     """
 
     model: str
+    room: RoomDoors
     handle_angle: float
     door_angle: Positive
     opened: Positive
@@ -139,6 +150,18 @@ class Experiment(NamedTuple):
     def load(cls) -> Experiment:
         """Read the file; raise ``ConfigurationError`` if it is wrong."""
         return load_settings(cls, resources.find("config/skill", "experiment"))
+
+    def kinematic_model(self, in_room: bool) -> KinematicModel:
+        """Load the model of doors that stand in rooms, or alone."""
+        return KinematicModel.load(self.room.model if in_room else self.model)
+
+    def random_doors(self, in_room: bool, count: int, seed: int) -> NDArray[np.float64]:
+        """Return morphing parameters (count, n + m): alone, over the model's whole limits."""
+        model, generator = self.kinematic_model(in_room), np.random.default_rng(seed)
+        if not in_room:
+            return model.sample(generator, count)
+        limits = np.array([self.room.limits[each.name] for each in model.parameters])
+        return generator.uniform(limits[:, 0], limits[:, 1], (count, len(limits)))
 
     def goal(self, mode: str) -> Goal:
         """Return the goal of a mode, ``pull`` or ``push``."""

@@ -61,6 +61,16 @@ def test_the_mean_of_frames_that_agree_is_taken() -> None:
     np.testing.assert_allclose(door(*frames).values(0.3), VALUES)
 
 
+def test_the_recess_is_that_of_the_last_usable_frame_until_another_world() -> None:
+    perceived = door(seen(0.1), seen(0.2, recess=0.03), seen(0.3))
+    assert perceived.recess == 0.03
+    with pytest.raises(DoorError):
+        perceived.add(seen(0.4, recess=0.09, problem="hidden"))
+    assert perceived.recess == 0.03
+    perceived.forget(0.5)
+    assert np.isnan(perceived.recess)
+
+
 def test_without_any_there_is_no_door() -> None:
     assert reason(door()) == "none"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -28,3 +29,11 @@ def test_whatever_is_not_ok_is_refused(status: int) -> None:
 def test_a_mirrored_door_and_other_handles_are_refused_with_the_reason() -> None:
     assert "handle is at the left" in problem(alternative="lever", mirrored=True)
     assert "the handle is a knob" in problem(alternative="knob")
+
+
+def test_the_recess_is_read_where_it_is_told() -> None:
+    names, values = ["tilt", "recess"], [0.2, 0.07]
+    message = MorphingParameters(surroundings_names=names, surroundings=values)
+    assert observation_from_message(message).recess == 0.07
+    for short in (MorphingParameters(), MorphingParameters(surroundings_names=["recess"])):
+        assert math.isnan(observation_from_message(short).recess)

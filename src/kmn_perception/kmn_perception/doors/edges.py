@@ -11,7 +11,6 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallView
 
-_STEP_NOISE = 0.012  # metres, of an edge that only depth or the network tell
 _UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
@@ -27,7 +26,10 @@ def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tup
     noise = settings.fit.edge_noise * float(candidate.view.footprint[line.column])
     rivals = _spread(candidate, side, settings)
     if line.contrast == 0.0:
-        place, scatter = float(candidate.view.s[line.column]), 3.0 * noise + _STEP_NOISE
+        place, scatter = (
+            float(candidate.view.s[line.column]),
+            3.0 * noise + settings.fit.step_edge_noise,
+        )
     else:
         place, scatter = _subpixel(candidate.view, candidate.pieces, line, settings)
     deviation = np.sqrt(noise**2 + scatter**2 + rivals**2)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.settings import HandleSettings
+from kmn_perception.doors.part_settings import HandleSettings
 from kmn_perception.doors.wall_view import WallFrame, WallView, resample
 from kmn_perception.model.camera import Camera
 
@@ -16,9 +16,6 @@ _FLOOR_OF_NOISE = 0.005  # of the logarithm of grey
 _PIXEL = 0.005  # metres
 _JOINED = 3  # pixels of a handle that may look like the panel
 _REACH = 0.12  # metres to either side of the peak that a handle may reach
-_EXTENT = 0.25  # of its largest contrast that still belongs to it
-_LEVER, _KNOB = 0.145, 0.055  # metres that they measure
-_AMBIGUOUS = 0.04  # metres: lengths that differ by less do not tell a lever from a knob
 
 
 class Hint(NamedTuple):
@@ -149,7 +146,9 @@ def _in_grey(
     z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
     shift = shifts[edges[0] if side == "left" else edges[1]]
     outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
-    kind, middle_s, sure = _kind(float(view.s[first]), float(view.s[last]), shift, outward)
+    kind, middle_s, sure = _kind(
+        float(view.s[first]), float(view.s[last]), shift, outward, settings
+    )
     along = settings.along_noise if sure else max(settings.along_noise, 0.4 * abs(shift))
     return Handle(side, kind, float(middle_s), z, ratio, other, along, settings.up_noise)
 
@@ -167,7 +166,9 @@ def _as_hinted(
     return Handle(side, hint.kind, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
 
 
-def _kind(first: float, last: float, shift: float, outward: bool) -> tuple[str, float, bool]:
+def _kind(
+    first: float, last: float, shift: float, outward: bool, settings: HandleSettings
+) -> tuple[str, float, bool]:
     """Return what spans from first to last, where its middle is seen, and whether that is sure.
 
     What stands out is seen shifted against its foot, and the neck between them joins the two. A
@@ -183,15 +184,15 @@ def _kind(first: float, last: float, shift: float, outward: bool) -> tuple[str, 
         Whether that is towards the panel's nearer edge.
     """
     length = last - first
-    as_lever = _LEVER + (0.0 if outward else abs(shift))
-    as_knob = _KNOB + abs(shift)
+    as_lever = settings.lever + (0.0 if outward else abs(shift))
+    as_knob = settings.knob + abs(shift)
     kind = "lever" if abs(length - as_lever) < abs(length - as_knob) else "knob"
-    sure = abs(as_lever - as_knob) > _AMBIGUOUS
+    sure = abs(as_lever - as_knob) > settings.length_noise
     head, inward = (last, -1.0) if shift > 0.0 else (first, 1.0)
     if kind == "knob":
-        half = 0.5 * max(length - abs(shift), _KNOB)
+        half = 0.5 * max(length - abs(shift), settings.knob)
     else:
-        half = 0.5 * (length if outward else max(length - abs(shift), _KNOB))
+        half = 0.5 * (length if outward else max(length - abs(shift), settings.knob))
     return kind, head + inward * half, sure
 
 
@@ -224,7 +225,7 @@ def _extent(
     contrast = (sign * band).max(axis=0)
     reach = round(_REACH / _PIXEL)
     window = slice(max(column - reach, 0), column + reach + 1)
-    on_it = contrast > max(_EXTENT * float(contrast[window].max()), 4.0 * noise)
+    on_it = contrast > max(settings.extent * float(contrast[window].max()), 4.0 * noise)
     ends = [column, column]
     for k, step in enumerate((-1, 1)):
         misses, i = 0, column

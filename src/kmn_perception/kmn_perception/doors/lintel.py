@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.lines import gaussian_steps, largest_near
-from kmn_perception.doors.settings import LintelSettings
+from kmn_perception.doors.part_settings import LintelSettings
 from kmn_perception.doors.view_cells import cell_of, row_of
 from kmn_perception.doors.wall_view import WallView
 
 _PIECE = 0.1  # metres
 _UNLIKELY = 0.02  # what a height that the network finds impossible still counts
 _SMOOTHING = 2.0  # pixels of the view
-_SEEN = 0.45  # of the width that a top must be seen in; a poster is narrower
 
 
 class Lintel(NamedTuple):
@@ -119,7 +118,7 @@ def _rows(
         near = cv2.dilate((sign * pieces).astype(np.float32), np.ones((5, 1), np.uint8))
         hits = ((near > settings.min_contrast) & told).sum(axis=1)
         contrast = np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0).sum(axis=1) / visible
-        good = (hits >= settings.min_coverage * visible) & (hits >= _SEEN * count)
+        good = (hits >= settings.min_coverage * visible) & (hits >= settings.min_width * count)
         best = np.where(good, np.maximum(best, contrast), best)
         enough |= good
     return best, enough

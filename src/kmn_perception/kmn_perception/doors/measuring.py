@@ -23,17 +23,11 @@ from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.lintel import Lintel, find_lintel
 from kmn_perception.doors.proposals import handle_of
-from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.settings import DoorSettings, RevealSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.doors.walls import Frame
-
-_VISIBLE_REVEAL = (0.5, 0.35)  # where frame's and panel's edge are both seen: which one is it
-_HIDDEN_REVEAL = (0.0, 0.1)
-_PROUD = (0.8, 0.2)
-_SWUNG = 0.06  # metres that an open panel's edge is away from its frame:
-_OWN, _UNKNOWN = (0.75, 0.25), (0.5, 0.5)  # then its own is seen, or nobody knows
 
 
 class Measurement(NamedTuple):
@@ -182,11 +176,7 @@ def _gather(
         point = ray / (panel_line @ ray)
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         outward = direction < 0.0 if i == 0 else direction > 0.0
-        reveal = _VISIBLE_REVEAL if outward else _HIDDEN_REVEAL
-        told = _PROUD if depth < 0.0 else reveal
-        if surfaces.opening != 0.0 and abs(depth) > _SWUNG:
-            told = _OWN if outward or depth < 0.0 else _UNKNOWN
-        values[7 + i], deviations[7 + i] = told
+        values[7 + i], deviations[7 + i] = _whose(depth, outward, surfaces, settings.reveal)
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
     if handle is None:
@@ -227,6 +217,25 @@ def _gather(
         deviations[9] = np.hypot(lintel.deviation / at.distance, apart)
     covariance += np.diag(deviations**2)
     return values, covariance
+
+
+def _whose(
+    depth: float, outward: bool, surfaces: Surfaces, settings: RevealSettings
+) -> tuple[float, float]:
+    """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
+
+    Parameters
+    ----------
+    depth
+        Of the panel's edge behind the wall's face, metres.
+    outward
+        Whether the camera looks past the frame's edge onto the reveal behind it.
+    """
+    if surfaces.opening != 0.0 and abs(depth) > settings.swung:
+        return settings.own if outward or depth < 0.0 else settings.unknown
+    if depth < 0.0:
+        return settings.proud
+    return settings.visible if outward else settings.hidden
 
 
 def _usual_top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
+from kmn_perception.doors.part_settings import HandleSettings, LintelSettings
 from kmn_perception.doors.search_settings import (
     FloorSettings,
     LineSettings,
@@ -69,6 +70,8 @@ class FitSettings:
         That a wall or a panel must have.
     edge_noise
         Standard deviation of an edge's direction, pixels.
+    step_edge_noise
+        And, metres, of one that depth or the network alone tells.
     """
 
     pixel_noise: Positive
@@ -88,94 +91,7 @@ class FitSettings:
     ajar: tuple[float, float]
     min_blocks: Count
     edge_noise: Positive
-
-
-class TrustSettings(NamedTuple):
-    """What makes a handle.
-
-    Attributes
-    ----------
-    contrast
-        Of the logarithm of grey.
-    ratio, other
-        Of its contrast to that of the panel's background, and to that at the other edge.
-    """
-
-    contrast: Positive
-    ratio: Positive
-    other: Positive
-
-
-@dataclass(frozen=True)
-class HandleSettings:
-    """What a handle looks like on its panel.
-
-    Attributes
-    ----------
-    heights
-        Above the floor, metres.
-    reach
-        From the panel's edge, metres.
-    bar
-        Length and height of the mask of a lever, metres, and distance of the two masks above and
-        below it with which it is compared.
-    inset
-        Distances of its middle from the panel's edge, metres.
-    alone, doubted, confirmed
-        What it must show without a network, where the network sees none, and where it sees one.
-    min_probability, sure
-        Of the network's, from which on it sees a handle, and is right without any contrast.
-    hint_reach, hint_noise, bar_noise
-        Distance to the network's place within which the handle is sought; standard deviations of
-        that place, along and up; and up a vertical bar, metres.
-    protrusion
-        Of the handle's middle before the panel: value and standard deviation, metres.
-    bump
-        Depth: the handle's mean offset that counts, in standard deviations of such means.
-    along_noise, up_noise
-        Standard deviations of its middle, metres.
-    """
-
-    heights: Interval
-    reach: Positive
-    inset: Interval
-    bar: tuple[float, float, float]
-    alone: TrustSettings
-    doubted: TrustSettings
-    confirmed: TrustSettings
-    min_probability: Fraction
-    sure: Fraction
-    hint_reach: Positive
-    hint_noise: tuple[float, float]
-    bar_noise: Positive
-    protrusion: tuple[float, float]
-    bump: Positive
-    along_noise: Positive
-    up_noise: Positive
-
-
-@dataclass(frozen=True)
-class LintelSettings:
-    """The top of the door.
-
-    Attributes
-    ----------
-    heights
-        At which it is sought, metres above the floor.
-    min_coverage, min_contrast
-        Share of its visible pieces that must show it, by such a step of the logarithm of grey.
-    noise
-        Standard deviation of its height, metres.
-    sure, hint_noise
-        Probability from which on the network alone tells it, and its deviation then, metres.
-    """
-
-    heights: Interval
-    min_coverage: Fraction
-    min_contrast: Positive
-    noise: Positive
-    sure: Fraction
-    hint_noise: Positive
+    step_edge_noise: Positive
 
 
 @dataclass(frozen=True)
@@ -223,6 +139,29 @@ class VerdictSettings:
     rival: NonNegative
 
 
+class RevealSettings(NamedTuple):
+    """Whose edge is seen, the frame's (0) or the panel's own (1): value and standard deviation.
+
+    Attributes
+    ----------
+    visible, hidden
+        Of a recessed panel, where both edges are in sight, and where the frame hides the panel's.
+    proud
+        Of a panel that stands out of the wall.
+    swung
+        Metres between the edges from which on an open panel's is told from the frame's.
+    own, unknown
+        Then, where the panel's own is in sight, and where it may not be.
+    """
+
+    visible: tuple[float, float]
+    hidden: tuple[float, float]
+    proud: tuple[float, float]
+    swung: Positive
+    own: tuple[float, float]
+    unknown: tuple[float, float]
+
+
 class PriorSettings(NamedTuple):
     """What is known of doors where the view does not show it: value and deviation, metres."""
 
@@ -247,6 +186,7 @@ class DoorSettings:
     lintel: LintelSettings
     verdict: VerdictSettings
     network: NetworkSettings
+    reveal: RevealSettings
     prior: PriorSettings
     candidates: Count
     calibration: Calibration

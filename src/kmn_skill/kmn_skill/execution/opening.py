@@ -50,7 +50,8 @@ class OpeningSettings:
     hidden_distance
         Metres after which the robot hides the door; then where it was before is relied upon.
     surroundings, recess
-        Whether a ``wall`` stands around the door, and how deep (m) the panel's front lies in it.
+        Whether a ``wall`` stands around the door, and how deep (m) the panel's front lies in it
+        where perception does not tell.
     """
 
     door_timeout: float
@@ -226,7 +227,9 @@ class DoorOpening:
         """Return what stands around a door of configuration parameters (m,)."""
         if self._settings.surroundings != WALL:
             return ()
-        return wall_around(self._model, gamma, self._settings.recess, self._wall)
+        seen = self._door.recess
+        recess = seen if math.isfinite(seen) else self._settings.recess
+        return wall_around(self._model, gamma, recess, self._wall)
 
     def _follow(self, plan: Plan) -> None:
         """Send a plan part by part until all is done and at rest."""

@@ -68,6 +68,8 @@ class DoorObservation(NamedTuple):
         (n + m, n + m) of the values; NaN where unknown.
     problem
         Why they are not valid; empty if they are.
+    recess
+        Of the panel's front behind the wall's face, metres; NaN where unknown.
     """
 
     time: float
@@ -77,6 +79,7 @@ class DoorObservation(NamedTuple):
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
     problem: str
+    recess: float = math.nan
 
 
 def when_closed(
@@ -111,6 +114,8 @@ class PerceivedDoor:
     ----------
     settings
         May be replaced.
+    recess
+        Of the last usable observation that told it, metres; else NaN.
     """
 
     def __init__(self, model: KinematicModel, frame: str, settings: AcceptanceSettings) -> None:
@@ -119,6 +124,7 @@ class PerceivedDoor:
         self._kept: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)
         self._refused: DoorError | None = None  # the last one
         self._since = -math.inf  # seconds; what was seen before was another world
+        self.recess = math.nan
 
     def add(self, observation: DoorObservation) -> None:
         """Keep an observation; one that is not usable separates those before from those after.
@@ -142,6 +148,8 @@ class PerceivedDoor:
             if self._kept and observation.time < self._kept[-1].time:
                 self._kept.clear()  # the clock was set back: another world
             self._kept.append(observation)
+            if math.isfinite(observation.recess):
+                self.recess = observation.recess
 
     def forget(self, now: float) -> None:
         """Forget all observations from before a time (s), as of another world."""
@@ -149,6 +157,7 @@ class PerceivedDoor:
             self._kept.clear()
             self._refused = None
             self._since = now
+            self.recess = math.nan
 
     def values(self, now: float) -> NDArray[np.float64]:
         """Return the mean parameters (n + m,) of the frames that agree.

@@ -54,10 +54,13 @@ class Patience(NamedTuple):
         Of another door, after which skill_node relies on no older one.
     skill_node
         Parameters of skill_node, in seconds of real time.
+    skill_node_in_rooms
+        Parameters of skill_node for doors in rooms.
     """
 
     new_frames: Count
     skill_node: dict[str, NonNegative]
+    skill_node_in_rooms: dict[str, NonNegative]
 
     @classmethod
     def load(cls) -> Patience:
@@ -153,7 +156,9 @@ class DoorSystem:
         given = [float(value) for value in values]
         self._set(placement="given", values=given, direction=direction, **around)
         if room is not None:
-            wall = {"surroundings": WALL, "recess": room.recess}
+            wall: dict[str, Any] = {"surroundings": WALL}
+            if self._source != "perceived":
+                wall["recess"] = room.recess
             self._client.set_parameters(self._knowing, wall, scene)
         self._truth = None
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
@@ -196,9 +201,10 @@ class DoorSystem:
         return nodes
 
     def _skill_parameters(self) -> dict[str, float]:
-        """Return the parameters of skill_node in simulated seconds."""
+        """Return the parameters of skill_node, in simulated seconds."""
         pace = max(1.0, self._sim["real_time_factor"])
-        return {name: pace * value for name, value in self._patience.skill_node.items()}
+        paced = {name: pace * value for name, value in self._patience.skill_node.items()}
+        return {**paced, **(self._patience.skill_node_in_rooms if self._in_rooms else {})}
 
     def _connect(self) -> None:
         node = self._node

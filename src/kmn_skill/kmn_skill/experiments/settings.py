@@ -108,7 +108,7 @@ class PrototypeGuesses(NamedTuple):
 
 
 class RoomDoors(NamedTuple):
-    """Doors in rooms: their kinematic model, and the limits of what is drawn, metres and radians."""
+    """Doors in rooms: their kinematic model, and limits of what is drawn, metres and radians."""
 
     model: str
     limits: dict[str, Interval]

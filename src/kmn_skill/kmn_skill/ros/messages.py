@@ -27,6 +27,7 @@ from kmn_skill.planning.layout import BASE_POSITION, HANDLE
 from kmn_skill.planning.plan import Plan
 
 PATH_WIDTH = 0.02  # metres
+RECESS = "recess"  # of the surroundings: how far the panel lies behind the wall's face
 HANDLES = ("", "lever")  # kinds that the policy can turn; models of one kind do not name it
 BASE_COLOUR = ColorRGBA(r=0.36, g=0.61, b=0.94, a=1.0)
 HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
@@ -47,7 +48,14 @@ def observation_from_message(message: MorphingParameters) -> DoorObservation:
         values=values,
         covariance=covariance,
         problem=_problem(message),
+        recess=_recess(message),
     )
+
+
+def _recess(message: MorphingParameters) -> float:
+    """Return how far the panel lies behind the wall's face (m), NaN where that is not told."""
+    told = zip(message.surroundings_names, message.surroundings, strict=False)
+    return float(dict(told).get(RECESS, math.nan))
 
 
 def _problem(message: MorphingParameters) -> str:

@@ -76,7 +76,8 @@ class Opened(NamedTuple):
     result
         Of the action.
     perceived
-        The last parameters (n + m,) that skill_node could take when the goal was sent.
+        The last parameters (n + m,) that skill_node could take when the goal was sent; where there
+        were none, those that it refused.
     hinge
         Angle of the door in the physics at the end, radians.
     """
@@ -116,8 +117,7 @@ class DoorSystem:
         self._processes: list[NodeProcess] = []
         self._stack = ExitStack()
         self._truth: MorphingParameters | None = None
-        self._taken: list[MorphingParameters] = []
-        self._perceives = False
+        self._seen: list[MorphingParameters] = []
         self._hinge = float("nan")
 
     def __enter__(self) -> DoorSystem:
@@ -163,7 +163,7 @@ class DoorSystem:
         self._truth = None
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
-        self._taken.clear()
+        self._seen.clear()
         frames = self._patience.new_frames
         self._client.wait(
             lambda: self._count_since(since) >= frames, scene, "what perceives the door"
@@ -171,7 +171,8 @@ class DoorSystem:
 
     def open(self, goal: Goal, feedback: Callable[[OpenDoor.Feedback], None]) -> Opened:
         """Open the door that is there; ``feedback`` is told what is being done."""
-        perceived = np.array([*self._taken[-1].theta, *self._taken[-1].gamma])
+        last = next((m for m in reversed(self._seen) if m.status == m.OK), self._seen[-1])
+        perceived = np.array([*last.theta, *last.gamma])
         request = OpenDoor.Goal(handle_angle=goal.handle_angle, door_angle=goal.door_angle)
         accepted = self._action.send_goal_async(
             request, feedback_callback=lambda message: feedback(message.feedback)
@@ -233,7 +234,7 @@ class DoorSystem:
         return truth if truth and np.allclose([*truth.theta, *truth.gamma], values) else None
 
     def _count_since(self, since: Time) -> int:
-        return sum(Time.from_msg(message.header.stamp) >= since for message in self._taken)
+        return sum(Time.from_msg(message.header.stamp) >= since for message in self._seen)
 
     def _is_ready(self) -> bool:
         return (
@@ -241,16 +242,14 @@ class DoorSystem:
             and self._knowing.service_is_ready()
             and self._action.server_is_ready()
             and self._truth is not None
-            and self._perceives
+            and len(self._seen) > 0
         )
 
     def _on_truth(self, message: MorphingParameters) -> None:
         self._truth = message
 
     def _on_parameters(self, message: MorphingParameters) -> None:
-        self._perceives = True  # be it a door or not
-        if message.status == MorphingParameters.OK:
-            self._taken.append(message)
+        self._seen.append(message)
 
     def _on_door(self, message: JointState) -> None:
         self._hinge = message.position[HINGE]

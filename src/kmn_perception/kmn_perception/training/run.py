@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any
@@ -11,6 +14,7 @@ from typing import Any
 import torch
 
 from kmn_perception.configuration.output import replacing
+from kmn_perception.configuration.section import ConfigurationError
 
 
 class RunError(ValueError):
@@ -93,3 +97,21 @@ class Run:
 
 def _first_line(error: Exception) -> str:
     return str(error).split("\n")[0].strip() or type(error).__name__
+
+
+def run_to_end(program: str, train: Callable[[], None]) -> None:
+    """Train, and exit with what went wrong in one line; an interrupted run is resumed by the same.
+
+    Parameters
+    ----------
+    program
+        Name that stands before an error.
+    """
+    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
+    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
+    try:
+        train()
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the same command resumes from the last checkpoint")
+    except (ConfigurationError, OSError, RunError) as error:
+        sys.exit(f"{program}: {error}")

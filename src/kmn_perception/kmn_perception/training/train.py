@@ -6,20 +6,18 @@ import argparse
 import dataclasses
 import shutil
 import signal
-import sys
-import warnings
 from typing import Any
 
 import torch
 
 from kmn_perception.command_line.arguments import output_file, output_folder, whole_number
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import ConfigurationError, Section
+from kmn_perception.configuration.section import Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
 from kmn_perception.network.designs import DESIGNS
 from kmn_perception.training.procedures import load_training_settings, procedure_of
-from kmn_perception.training.run import Run, RunError
+from kmn_perception.training.run import Run, run_to_end
 from kmn_perception.training.settings import SharedSettings, TrainingSettings
 from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
@@ -111,11 +109,4 @@ def _result(training: Training, known: dict[str, Any]) -> weights.Weights:
 def main() -> None:
     """Run the executable; an interrupted run is resumed by the same command."""
     options = arguments()
-    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
-    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
-    try:
-        train(options)
-    except KeyboardInterrupt:
-        sys.exit("interrupted; the same command resumes from the last checkpoint")
-    except (ConfigurationError, OSError, RunError) as error:
-        sys.exit(f"train: {error}")
+    run_to_end("train", lambda: train(options))

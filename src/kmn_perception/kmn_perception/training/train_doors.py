@@ -6,21 +6,18 @@ import argparse
 import dataclasses
 import shutil
 import signal
-import sys
-import warnings
 from typing import Any
 
 import torch
 
 from kmn_perception.command_line.arguments import output_file, output_folder, whole_number
-from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.network import wall_weights
 from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.wall_network import WallNetwork
 from kmn_perception.rooms.settings import RoomSettings
-from kmn_perception.training.run import Run, RunError
+from kmn_perception.training.run import Run, run_to_end
 from kmn_perception.training.settings import SharedSettings
 from kmn_perception.training.wall.fitting import Fitting
 from kmn_perception.training.wall.settings import WallTrainingSettings
@@ -119,11 +116,4 @@ def _plain(settings: Any) -> Any:
 def main() -> None:
     """Run the executable; an interrupted run is resumed by the same command."""
     options = arguments()
-    torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
-    warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
-    try:
-        train(options)
-    except KeyboardInterrupt:
-        sys.exit("interrupted; the same command resumes from where it was")
-    except (ConfigurationError, OSError, RunError) as error:
-        sys.exit(f"train_doors: {error}")
+    run_to_end("train_doors", lambda: train(options))

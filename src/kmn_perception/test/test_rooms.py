@@ -229,6 +229,13 @@ def test_behind_glass_nothing_is_measured() -> None:
     assert max(lost) > 0.05 > min(lost)
 
 
+def test_depth_whose_calibration_is_off_is_named_as_delivered(tmp_path: Path) -> None:
+    assert main(["--out", str(tmp_path), "--count", "1", "--calibration", "raw"]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "door_0.json", "door_0_colour.jpg", "door_0_raw.png"
+    ]  # fmt: skip
+
+
 def test_the_program_writes_frames_with_labels(tmp_path: Path) -> None:
     assert main(["--out", str(tmp_path / "new"), "--count", "2", "--seed", "7"]) == 0
     written = json.loads((tmp_path / "new" / "door_7.json").read_text())

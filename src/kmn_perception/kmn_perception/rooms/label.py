@@ -26,7 +26,8 @@ def label(frame: Frame, name: str, source: dict[str, Any]) -> dict[str, Any]:
     Parameters
     ----------
     name
-        Of the frame: its files are NAME_d.png, NAME_colour.jpg and NAME.json.
+        Of the frame: its files are NAME_d.png, or NAME_raw.png where the calibration is off,
+        NAME_colour.jpg and NAME.json.
     source
         How it was made.
     """

@@ -26,7 +26,8 @@ def write(folder: Path, name: str, frame: Frame, source: dict[str, Any]) -> None
     """Write images and label of a frame."""
     depth = np.nan_to_num(np.rint(1e3 * frame.depth)).astype(np.uint16)
     grey = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
-    for ending, image, options in (("d.png", depth, []), ("colour.jpg", frame.images.grey, grey)):
+    measured = "raw.png" if source["calibration"] == "raw" else "d.png"
+    for ending, image, options in ((measured, depth, []), ("colour.jpg", frame.images.grey, grey)):
         if not cv2.imwrite(str(folder / f"{name}_{ending}"), image, options):
             raise OSError(f"{folder / name}_{ending} cannot be written")
     write_json(folder / f"{name}.json", label(frame, name, source))

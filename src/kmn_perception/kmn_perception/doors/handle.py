@@ -15,13 +15,25 @@ from kmn_perception.model.camera import Camera
 _FLOOR_OF_NOISE = 0.005  # of the logarithm of grey
 _PIXEL = 0.005  # metres
 _JOINED = 3  # pixels of a handle that may look like the panel
+_CONVINCED = np.log(3.0)  # of odds no more is believed: aslant, knobs on stems look like levers
 _REACH = 0.12  # metres to either side of the peak that a handle may reach
 
 
 class Hint(NamedTuple):
-    """Where a network sees a handle: its kind, place on the panel (metres) and probability."""
+    """Where a network sees a handle.
+
+    Attributes
+    ----------
+    kind, lever_odds
+        Its kind, and how much likelier a lever is than a knob.
+    s, z
+        Its place on the panel, metres.
+    probability
+        That it is there.
+    """
 
     kind: str
+    lever_odds: float
     s: float
     z: float
     probability: float
@@ -146,11 +158,9 @@ def _in_grey(
     z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
     shift = shifts[edges[0] if side == "left" else edges[1]]
     outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
-    kind, middle_s, sure = _kind(
-        float(view.s[first]), float(view.s[last]), shift, outward, settings
-    )
-    along = settings.along_noise if sure else max(settings.along_noise, 0.4 * abs(shift))
-    return Handle(side, kind, float(middle_s), z, ratio, other, along, settings.up_noise)
+    seen = _Span(float(view.s[first]), float(view.s[last]), shift, outward)
+    kind, at, along = _kind(seen, hint if trust is settings.confirmed else None, settings)
+    return Handle(side, kind, at, z, ratio, other, along, settings.up_noise)
 
 
 def _as_hinted(
@@ -166,15 +176,13 @@ def _as_hinted(
     return Handle(side, hint.kind, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
 
 
-def _kind(
-    first: float, last: float, shift: float, outward: bool, settings: HandleSettings
-) -> tuple[str, float, bool]:
-    """Return what spans from first to last, where its middle is seen, and whether that is sure.
+class _Span(NamedTuple):
+    """What a handle spans on its panel.
 
     What stands out is seen shifted against its foot, and the neck between them joins the two. A
     lever points inward: it hides its neck where the shift is outward, and prolongs it elsewhere.
 
-    Parameters
+    Attributes
     ----------
     first, last
         Along the panel, metres.
@@ -183,17 +191,43 @@ def _kind(
     outward
         Whether that is towards the panel's nearer edge.
     """
-    length = last - first
-    as_lever = settings.lever + (0.0 if outward else abs(shift))
-    as_knob = settings.knob + abs(shift)
-    kind = "lever" if abs(length - as_lever) < abs(length - as_knob) else "knob"
-    sure = abs(as_lever - as_knob) > settings.length_noise
-    head, inward = (last, -1.0) if shift > 0.0 else (first, 1.0)
-    if kind == "knob":
-        half = 0.5 * max(length - abs(shift), settings.knob)
-    else:
-        half = 0.5 * (length if outward else max(length - abs(shift), settings.knob))
-    return kind, head + inward * half, sure
+
+    first: float
+    last: float
+    shift: float
+    outward: bool
+
+    def excess(self, kind: str, settings: HandleSettings) -> float:
+        """Return by how much it is longer than a kind of handle, metres."""
+        if kind == "knob":
+            expected = settings.knob + abs(self.shift)
+        else:
+            expected = settings.lever + (0.0 if self.outward else abs(self.shift))
+        return self.last - self.first - expected
+
+    def middle(self, kind: str, settings: HandleSettings) -> float:
+        """Return where the middle of a kind of handle is seen, metres along the panel."""
+        length = self.last - self.first
+        if kind == "knob" or not self.outward:
+            length = max(length - abs(self.shift), settings.knob)
+        return self.last - 0.5 * length if self.shift > 0.0 else self.first + 0.5 * length
+
+
+def _kind(seen: _Span, hint: Hint | None, settings: HandleSettings) -> tuple[str, float, float]:
+    """Return what is seen, where its middle is, and the deviation of that, metres.
+
+    Length and network speak for a lever or a knob; where neither is sure, the middle may be that
+    of the other kind.
+    """
+    excess = np.array([seen.excess(kind, settings) for kind in ("knob", "lever")])
+    evidence = float(np.diff(-(excess**2))[0]) / (2.0 * settings.length_deviation**2)
+    if hint is not None:
+        evidence += float(np.clip(np.log(hint.lever_odds), -_CONVINCED, _CONVINCED))
+    kinds = ("lever", "knob") if evidence > 0.0 else ("knob", "lever")
+    at, other = (seen.middle(kind, settings) for kind in kinds)
+    doubt = 1.0 / (1.0 + np.exp(abs(evidence)))
+    apart = np.sqrt(doubt * (1.0 - doubt)) * (other - at)
+    return kinds[0], at, float(np.hypot(settings.along_noise, apart))
 
 
 def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> NDArray[np.float32]:

@@ -129,7 +129,7 @@ def _hint(candidate: Candidate, panel: WallFrame) -> Hint | None:
     ray = at.points(np.array(seen.s), np.array(seen.z))
     point = ray * (-panel.distance / float(ray @ panel.normal))
     z = float(point @ panel.up) + panel.height
-    return Hint(seen.kind, float(point @ panel.right), z, seen.probability)
+    return Hint(seen.kind, seen.lever_odds, float(point @ panel.right), z, seen.probability)
 
 
 def _lintel_heights(

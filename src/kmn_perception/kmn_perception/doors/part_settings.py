@@ -54,8 +54,8 @@ class HandleSettings:
         Standard deviations of its middle, metres.
     lever, knob
         Usual lengths, metres.
-    length_noise
-        Difference of lengths, metres, that does not tell a lever from a knob.
+    length_deviation
+        Standard deviation of a handle's length, metres.
     extent
         It reaches as far as this part of its largest contrast.
     """
@@ -78,7 +78,7 @@ class HandleSettings:
     up_noise: Positive
     lever: Positive
     knob: Positive
-    length_noise: Positive
+    length_deviation: Positive
     extent: Fraction
 
 

@@ -15,6 +15,7 @@ from kmn_perception.doors.view_cells import cell_of, cells_of, column_of, height
 from kmn_perception.doors.wall_view import WallView
 from kmn_perception.network.wall_network import KINDS, Proposals, WallNetwork, propose
 
+_LEAST = 1e-6  # probability of what a network finds impossible
 _BESIDE = 6  # cells beside an edge where what stands out may be seen
 
 
@@ -60,6 +61,7 @@ class SeenHandle(NamedTuple):
     """A handle that the network sees: its kind, and the middle's place in the view, metres."""
 
     kind: str
+    lever_odds: float  # how much likelier than a knob
     s: float
     z: float
     probability: float
@@ -84,8 +86,10 @@ def handle_of(candidate: Candidate) -> SeenHandle | None:
     z = np.average(
         height_of(view, rows.start + np.arange(len(weights))), weights=weights.sum(axis=1)
     )
-    kind = KINDS[int(part.sum(axis=(1, 2)).argmax())]
-    return SeenHandle(kind, float(s), float(z), float(part.sum()))
+    by_kind = part.sum(axis=(1, 2)) + _LEAST
+    lever, knob = (float(by_kind[KINDS.index(kind)]) for kind in ("lever", "knob"))
+    kind = KINDS[int(by_kind.argmax())]
+    return SeenHandle(kind, lever / knob, float(s), float(z), float(part.sum()))
 
 
 def edge_probability(candidate: Candidate, side: str) -> float:

@@ -22,6 +22,7 @@ MEASURED = (
     "handle", "handle_rise",      # directions to the right, and up, per metre away
     "protrusion",                 # of the handle's middle before the panel, metres
 )  # fmt: skip
+EDGES = slice(5, 9)  # of these: what is measured of the upright edges
 # What follows. Metres and radians; the world's origin lies on the floor below the camera, x points
 # where the camera looks, z up. `x`, `y`, `yaw` are those of the closed door, and `opening` is
 # positive away from the camera, see the model.

@@ -12,6 +12,7 @@ from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.edges import measure_edge
 from kmn_perception.doors.geometry import (
     DOOR,
+    EDGES,
     HANDLE_INSET,
     DoorShape,
     View2d,
@@ -40,7 +41,8 @@ class Measurement(NamedTuple):
     inverse_height
         Of the camera above the floor, 1/m.
     edge_deviations
-        Of the left and right edge along the wall, metres, as the image tells them.
+        Of the left and right edge, metres, as the image tells them: other lines that may be it, and
+        whether it is the frame's or the panel's, but not the error of the panel's plane.
     handle
         None where it is not seen.
     """
@@ -96,8 +98,23 @@ def measure(
         values,
         spread,
         float(measured[4]),
-        (edges[0][1] * at.distance, edges[1][1] * at.distance),
+        _edge_deviations(measured, covariance, handle_left, ajar),
     )
+
+
+def _edge_deviations(
+    measured: NDArray[np.float64], covariance: NDArray[np.float64], handle_left: bool, ajar: bool
+) -> tuple[float, float]:
+    """Return how well it is known which lines are the panel's edges, wherever its plane is."""
+    own = np.zeros_like(covariance)
+    own[EDGES, EDGES] = covariance[EDGES, EDGES]
+
+    def corners(m: NDArray[np.float64]) -> NDArray[np.float64]:
+        shape = door_shape(m, handle_left, ajar)
+        return np.concatenate([shape.left, shape.right])
+
+    variances = np.diag(propagate(corners, measured, own)[1])
+    return float(np.sqrt(variances[:2].sum())), float(np.sqrt(variances[2:].sum()))
 
 
 def _is_on_panel(

@@ -127,8 +127,7 @@ def _in_grey(
     assert view.grey is not None
     known = cv2.erode(view.inside.astype(np.uint8), np.ones((15, 5), np.uint8)) > 0
     answer = np.abs(bar_response(view.grey, settings.bar)) * known * level[:, None]
-    background = answer[level][:, middle]
-    if not background.size:
+    if not (background := answer[level][:, middle]).size:
         return None
     noise = 1.48 * float(np.median(background)) + _FLOOR_OF_NOISE
     # A darker surface beside the panel may be noisier.
@@ -284,7 +283,8 @@ def _in_depth(
     share = cv2.blur(known.astype(np.float32), size, borderType=cv2.BORDER_CONSTANT)
     mean = cv2.blur(offset, size, borderType=cv2.BORDER_CONSTANT) / np.maximum(share, 0.5)
     far = cv2.blur(offset, (6 * size[0], 6 * size[1]), borderType=cv2.BORDER_REPLICATE)
-    bump = np.where((share > 0.5) & level[:, None], mean - far, 0.0) / step_noise
+    anywhere = np.where(share > 0.5, mean - far, 0.0) / step_noise
+    bump = np.where(level[:, None], anywhere, 0.0)
     peaks = {side: float(bump[:, window].max(initial=0.0)) for side, window in windows.items()}
     side = max(peaks, key=lambda name: peaks[name])
     other = peaks[side] / max(peaks["right" if side == "left" else "left"], 1.0)
@@ -292,6 +292,8 @@ def _in_depth(
         return None
     masked = np.where(windows[side], bump, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
+    if anywhere[max(row - 2, 0) : row + 3, column].max() > peaks[side]:
+        return None  # it goes on above or below where handles are
     along, up = settings.hint_noise
     return Handle(
         side, "lever", float(view.s[column]), float(view.z[row]), peaks[side], other, along, up

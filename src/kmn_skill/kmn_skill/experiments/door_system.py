@@ -112,6 +112,8 @@ class DoorSystem:
     ) -> None:
         model = experiment.room.model if in_rooms else experiment.model
         self._sim = {**sim, "model": model, "image": in_rooms}
+        if in_rooms:
+            self._sim["renderer"] = "software"  # EGL's highlights are none of a room's light
         self._source, self._timeouts, self._in_rooms = source, experiment.timeouts, in_rooms
         self._patience = Patience.load()
         self._processes: list[NodeProcess] = []

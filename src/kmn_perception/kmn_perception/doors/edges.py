@@ -11,6 +11,7 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallView
 
+_UNMARKED = 0.5  # likelihood of an edge of the pair that shows no line
 _UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
@@ -48,19 +49,57 @@ def _spread(candidate: Candidate, side: str, settings: DoorSettings) -> float:
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
         if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
-            weights.append((min(line.contrast, 1.0) * _probability(candidate, side, line)) ** 2)
+            weights.append(
+                (min(line.contrast, 1.0) * _probability(candidate, side, line.column)) ** 2
+            )
             offsets.append(offset)
     if not sum(weights):
         return 0.0
     return float(np.sqrt(np.average(np.square(offsets), weights=weights)))
 
 
-def _probability(candidate: Candidate, side: str, line: Line) -> float:
-    """Return the network's probability that a line is the door's edge; 1 without a network."""
+def both_seen(
+    candidate: Candidate, side: str, depth: float, settings: DoorSettings
+) -> tuple[float, float]:
+    """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
+
+    Behind a frame's edge in sight the panel's own appears nearer to the middle, before a panel's
+    edge the frame's farther out: where a line is, and where the network sees the door's edge, tells
+    which of the two was taken.
+
+    Parameters
+    ----------
+    depth
+        Of the panel behind the wall's face, metres.
+    """
+    view, line = candidate.view, candidate.edge(side)
+    distance, pixel = view.frame.distance, float(view.s[1] - view.s[0])
+    place = float(view.s[line.column])
+    inner, outer = place * distance / (distance + depth), place * (distance + depth) / distance
+
+    def column(s: float) -> int:
+        return round((s - float(view.s[0])) / pixel)
+
+    def is_line(s: float) -> bool:
+        reach = settings.reveal.line / pixel
+        return any(
+            abs(other.column - column(s)) <= reach < abs(other.column - line.column)
+            and other.coverage >= settings.verdict.min_coverage
+            for other in candidate.lines
+        )
+
+    own = _probability(candidate, side, line.column) * (1.0 if is_line(outer) else _UNMARKED)
+    frame = _probability(candidate, side, column(inner)) * (1.0 if is_line(inner) else _UNMARKED)
+    share = own / (own + frame)
+    return share, max(float(np.sqrt(share * (1.0 - share))), settings.reveal.hidden[1])
+
+
+def _probability(candidate: Candidate, side: str, column: int) -> float:
+    """Return the network's probability that the door's edge is there; 1 without a network."""
     if candidate.proposals is None:
         return 1.0
     found = candidate.proposals.left if side == "left" else candidate.proposals.right
-    return near(found, round(cell_of(candidate.view, line.column)), 1) + _UNLIKELY
+    return near(found, round(cell_of(candidate.view, column)), 1) + _UNLIKELY
 
 
 def _subpixel(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
-from kmn_perception.doors.edges import measure_edge
+from kmn_perception.doors.edges import both_seen, measure_edge
 from kmn_perception.doors.geometry import (
     DOOR,
     EDGES,
@@ -81,7 +81,9 @@ def measure(
     look = View2d(at.right[2], -at.normal[2])
     ajar = surfaces.opening != 0.0
     for found in (handle, None):
-        measured, covariance = _gather(at, panel, surfaces, edges, lintel, found, height, settings)
+        measured, covariance = _gather(
+            candidate, panel, surfaces, edges, lintel, found, height, settings
+        )
         handle_left = found is not None and found.side == "left"
         values_of = partial(door_values, handle_left=handle_left, ajar=ajar, look=look)
         values, spread = propagate(values_of, measured, covariance)
@@ -174,7 +176,7 @@ def _along(at: WallFrame, panel: WallFrame, surfaces: Surfaces, direction: float
 
 
 def _gather(
-    at: WallFrame,
+    candidate: Candidate,
     panel: WallFrame,
     surfaces: Surfaces,
     edges: list[tuple[float, float]],
@@ -184,6 +186,7 @@ def _gather(
     settings: DoorSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what was measured (13,) and its covariance, see `MEASURED`."""
+    at = candidate.view.frame
     wall_line, panel_line = surfaces.values[WALL], surfaces.values[PANEL]
     values, deviations = np.zeros(13), np.zeros(13)
     values[:5] = surfaces.values[:5]
@@ -193,7 +196,11 @@ def _gather(
         point = ray / (panel_line @ ray)
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         outward = direction < 0.0 if i == 0 else direction > 0.0
-        values[7 + i], deviations[7 + i] = _whose(depth, outward, surfaces, settings.reveal)
+        side = ("left", "right")[i]
+        told = _whose(depth, outward, surfaces, settings.reveal)
+        if told is settings.reveal.visible and candidate.view.grey is not None:
+            told = both_seen(candidate, side, depth, settings)
+        values[7 + i], deviations[7 + i] = told
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
     if handle is None:

@@ -145,7 +145,10 @@ class RevealSettings(NamedTuple):
     Attributes
     ----------
     visible, hidden
-        Of a recessed panel, where both edges are in sight, and where the frame hides the panel's.
+        Of a recessed panel, by depth alone where both edges are in sight, and where the frame
+        hides the panel's.
+    line
+        Metres within which a line is one of the two edges.
     proud
         Of a panel that stands out of the wall.
     swung
@@ -156,6 +159,7 @@ class RevealSettings(NamedTuple):
 
     visible: tuple[float, float]
     hidden: tuple[float, float]
+    line: Positive
     proud: tuple[float, float]
     swung: Positive
     own: tuple[float, float]

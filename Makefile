@@ -30,8 +30,8 @@ SEED := 0
 MODE := pull
 
 .PHONY: demo
-demo: build $(READY)simulation  ## let a simulated PR2 open a door that it sees (SEED=0 MODE=pull)
-	@./run kmn_skill demo --seed $(SEED) --mode $(MODE)
+demo: build $(READY)simulation  ## let a simulated PR2 open a door in its wall, as it sees it (SEED=0 MODE=pull)
+	@./run kmn_skill demo --room --seed $(SEED) --mode $(MODE)
 
 .PHONY: demo-bag
 demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures

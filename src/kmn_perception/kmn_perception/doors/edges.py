@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kmn_perception.doors.candidates import Candidate
@@ -16,7 +18,7 @@ _UNLIKELY = 0.02  # what a place that the network finds impossible still counts
 
 
 def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tuple[float, float]:
-    """Return the direction of an edge and its standard deviation, rivals included.
+    """Return the direction of an edge and its standard deviation, if it is the door's.
 
     Returns
     -------
@@ -25,7 +27,6 @@ def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tup
     """
     line, distance = candidate.edge(side), candidate.view.frame.distance
     noise = settings.fit.edge_noise * float(candidate.view.footprint[line.column])
-    rivals = _spread(candidate, side, settings)
     if line.contrast == 0.0:
         place, scatter = (
             float(candidate.view.s[line.column]),
@@ -33,49 +34,71 @@ def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tup
         )
     else:
         place, scatter = _subpixel(candidate.view, candidate.pieces, line, settings)
-    deviation = np.sqrt(noise**2 + scatter**2 + rivals**2)
-    return place / distance, float(deviation) / distance
+    return place / distance, float(np.hypot(noise, scatter)) / distance
 
 
-def _spread(candidate: Candidate, side: str, settings: DoorSettings) -> float:
+def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: DoorSettings) -> float:
     """Return how far other lines that may be the edge lie from the one that was taken, metres.
 
     Frame, panel and what stands beside them have edges side by side. Each counts by the square of
     its contrast and, with a network, by the probability that it is the door's.
+
+    Parameters
+    ----------
+    pair
+        Where the other edge of the same reveal is seen, see `both_seen`; that is no rival.
     """
-    chosen = candidate.edge(side)
-    pixel = float(candidate.view.s[1] - candidate.view.s[0])
+    chosen, view = candidate.edge(side), candidate.view
+    pixel = float(view.s[1] - view.s[0])
     weights, offsets = [], []
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
-        if abs(offset) <= settings.lines.rivals and line.coverage >= settings.verdict.min_coverage:
-            weights.append(
-                (min(line.contrast, 1.0) * _probability(candidate, side, line.column)) ** 2
-            )
-            offsets.append(offset)
+        if abs(offset) > settings.lines.rivals or line.coverage < settings.verdict.min_coverage:
+            continue
+        place = float(view.s[line.column])
+        if line.column != chosen.column and any(
+            abs(place - other) <= settings.reveal.line for other in pair
+        ):
+            continue
+        contrast = min(line.contrast, settings.lines.equally_clear)
+        weights.append((contrast * _probability(candidate, side, line.column)) ** 2)
+        offsets.append(offset)
     if not sum(weights):
         return 0.0
     return float(np.sqrt(np.average(np.square(offsets), weights=weights)))
 
 
-def both_seen(
-    candidate: Candidate, side: str, depth: float, settings: DoorSettings
-) -> tuple[float, float]:
-    """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
+def reveal_pair(candidate: Candidate, side: str, depth: float) -> tuple[float, float]:
+    """Return where the other edge of a reveal would be seen along the wall, metres.
 
     Behind a frame's edge in sight the panel's own appears nearer to the middle, before a panel's
-    edge the frame's farther out: where a line is, and where the network sees the door's edge, tells
-    which of the two was taken.
+    edge the frame's farther out.
 
     Parameters
     ----------
     depth
         Of the panel behind the wall's face, metres.
     """
+    view = candidate.view
+    place, distance = float(view.s[candidate.edge(side).column]), view.frame.distance
+    return place * distance / (distance + depth), place * (distance + depth) / distance
+
+
+def both_seen(
+    candidate: Candidate, side: str, pair: tuple[float, float], settings: DoorSettings
+) -> tuple[float, float]:
+    """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
+
+    Where the other line of the pair is, and where the network sees the door's edge, tells which of
+    the two was taken.
+
+    Parameters
+    ----------
+    pair
+        Where the panel's edge would be seen, and where the frame's, see `reveal_pair`.
+    """
     view, line = candidate.view, candidate.edge(side)
-    distance, pixel = view.frame.distance, float(view.s[1] - view.s[0])
-    place = float(view.s[line.column])
-    inner, outer = place * distance / (distance + depth), place * (distance + depth) / distance
+    pixel, (inner, outer) = float(view.s[1] - view.s[0]), pair
 
     def column(s: float) -> int:
         return round((s - float(view.s[0])) / pixel)

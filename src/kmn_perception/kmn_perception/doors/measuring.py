@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
-from kmn_perception.doors.edges import both_seen, measure_edge
+from kmn_perception.doors.edges import both_seen, measure_edge, reveal_pair, rivals
 from kmn_perception.doors.geometry import (
     DOOR,
     EDGES,
@@ -191,15 +191,18 @@ def _gather(
     values, deviations = np.zeros(13), np.zeros(13)
     values[:5] = surfaces.values[:5]
     for i, (direction, deviation) in enumerate(edges):
-        values[5 + i], deviations[5 + i] = direction, deviation
+        values[5 + i] = direction
         ray = np.array([direction, 1.0])
         point = ray / (panel_line @ ray)
         depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
         outward = direction < 0.0 if i == 0 else direction > 0.0
         side = ("left", "right")[i]
-        told = _whose(depth, outward, surfaces, settings.reveal)
+        told, pair = _whose(depth, outward, surfaces, settings.reveal), None
         if told is settings.reveal.visible and candidate.view.grey is not None:
-            told = both_seen(candidate, side, depth, settings)
+            pair = reveal_pair(candidate, side, depth)
+            told = both_seen(candidate, side, pair, settings)
+        spread = rivals(candidate, side, pair or (), settings) / at.distance
+        deviations[5 + i] = np.hypot(deviation, spread)
         values[7 + i], deviations[7 + i] = told
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]

@@ -127,6 +127,8 @@ class LineSettings:
         Steps of so many standard deviations are edges without any grey.
     rivals
         Lines closer to an edge than this may be the door's instead, metres.
+    equally_clear
+        Steps of the logarithm of grey beyond which a line is no likelier to be the door's.
     tie
         Lines closer than this may be the same edge: frame, reveal and panel, metres.
     """
@@ -144,6 +146,7 @@ class LineSettings:
     step_noise: Positive
     min_step: Positive
     rivals: Positive
+    equally_clear: Positive
     tie: Positive
 
 

@@ -26,7 +26,9 @@ MODEL = EXPERIMENT.kinematic_model(in_room=True)
 GRASP = 0.02  # metres that the gripper forgives
 
 
-@pytest.mark.parametrize(("direction", "seed"), [("pull", 2), ("pull", 6), ("push", 0), ("push", 3)])
+@pytest.mark.parametrize(
+    ("direction", "seed"), [("pull", 2), ("pull", 6), ("push", 0), ("push", 3)]
+)
 def test_the_handle_and_the_edges_are_where_they_stand(direction: str, seed: int) -> None:
     values = EXPERIMENT.random_doors(True, 1, seed)[0]
     scenario = in_room(Scenario(MODEL, values, direction), seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -195,6 +196,18 @@ def test_the_mirror_image_of_a_frame_is_the_mirror_image_of_a_door() -> None:
         assert one.value(name) == pytest.approx(other.value(name), abs=slack), name
     for name in ("y", "yaw"):
         assert one.value(name) == pytest.approx(-other.value(name), abs=2.0 * one.deviation(name))
+
+
+@pytest.mark.parametrize("axis", [0, 2])  # pitch and roll
+def test_a_tilt_that_the_image_contradicts_is_refused(axis: int) -> None:
+    room = sample_room(1, CAMERA, settings(), "door")
+    frame = render(room, 1)
+    up = room.camera.pose[2, :3]
+    turn = cv2.Rodrigues(0.035 * np.eye(3)[axis])[0]  # by 2 degrees
+    assert finder().find(frame._replace(up=up)).found
+    refused = finder().find(frame._replace(up=turn @ up))
+    assert refused.status is DoorStatus.NO_DOOR
+    assert "vertical lines in the image are tilted by" in refused.reason
 
 
 def test_an_empty_frame_and_a_frame_without_walls_have_a_reason() -> None:

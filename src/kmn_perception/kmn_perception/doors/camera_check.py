@@ -53,6 +53,17 @@ def find_contradiction(
     return ""
 
 
+def doubt_tilt(up: NDArray[np.float64], seen: NDArray[np.float64], settings: DoorSettings) -> str:
+    """Return how the vertical lines of an image contradict the upward vector that is given."""
+    tilt = _angle(up, seen)
+    if tilt <= settings.vertical.max_tilt_error:
+        return ""
+    return (
+        f"the vertical lines in the image are tilted by {np.degrees(tilt):.1f} deg against the "
+        "pose that was given for the camera"
+    )
+
+
 def doubt_upright(
     found: DoorEstimate, planes: Sequence[Plane], up: NDArray[np.float64], settings: DoorSettings
 ) -> str:

@@ -57,6 +57,8 @@ class VerticalSettings:
     search, accept
         Angles about the first guess, and about the result, within which segments are vertical,
         radians.
+    max_tilt_error
+        By which a vertical that is given may differ from the one that the image shows, radians.
     """
 
     max_floor_tilt: Positive
@@ -68,6 +70,7 @@ class VerticalSettings:
     segment_noise: Positive
     search: Positive
     accept: Positive
+    max_tilt_error: Positive
 
 
 @dataclass(frozen=True)

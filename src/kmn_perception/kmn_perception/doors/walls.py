@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.camera_check import find_contradiction
+from kmn_perception.doors.camera_check import doubt_tilt, find_contradiction
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
@@ -96,8 +96,12 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     if not planes:
         raise NoWallError("no plane is seen")
     up = _up(frame, planes, settings)
-    if frame.up is not None and (wrong := find_contradiction(planes, up, frame.height, settings)):
-        raise NoWallError(wrong)
+    if frame.up is not None:
+        wrong = find_contradiction(planes, up, frame.height, settings)
+        if not wrong and frame.grey is not None:
+            wrong = doubt_tilt(up, _up(frame._replace(up=None), planes, settings), settings)
+        if wrong:
+            raise NoWallError(wrong)
     walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
     if not walls:
         raise NoWallError("no wall is seen")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -208,6 +209,33 @@ def test_a_tilt_that_the_image_contradicts_is_refused(axis: int) -> None:
     refused = finder().find(frame._replace(up=turn @ up))
     assert refused.status is DoorStatus.NO_DOOR
     assert "vertical lines in the image are tilted by" in refused.reason
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_a_pose_that_is_right_is_believed_however_the_camera_lies(turns: int) -> None:
+    room = sample_room(1, CAMERA, settings(), "door")
+    seen, up = render(room, 1), room.camera.pose[2, :3]
+    for _ in range(turns):
+        seen, up = quarter_turn(seen), np.array([up[1], -up[0], up[2]])
+    found = finder().find(seen._replace(up=up))
+    assert found.found, found.reason
+
+
+def quarter_turn(frame: Frame) -> Frame:
+    """Return what a camera sees that is turned clockwise: its image turns the other way."""
+    assert frame.grey is not None
+    camera = replace(
+        frame.camera,
+        width=frame.camera.height,
+        height=frame.camera.width,
+        fx=frame.camera.fy,
+        fy=frame.camera.fx,
+        cx=frame.camera.cy,
+        cy=frame.camera.width - 1 - frame.camera.cx,
+    )
+    return frame._replace(
+        depth=np.rot90(frame.depth).copy(), grey=np.rot90(frame.grey).copy(), camera=camera
+    )
 
 
 def test_an_empty_frame_and_a_frame_without_walls_have_a_reason() -> None:

@@ -19,7 +19,7 @@ from kmn_perception.model.camera import Camera
 
 _REWEIGHTINGS = 12
 _UNDER, _FEW = 0.1, 0.4  # lower by this part of the height; how much of it reflections are
-_IMAGE_UP = np.array([0.0, -1.0, 0.0])
+IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
 
 class HeightSource(Enum):
@@ -58,18 +58,19 @@ def find_up(
     planes: Sequence[Plane],
     segments: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
     settings: VerticalSettings,
+    expected: NDArray[np.float64] = IMAGE_UP,
 ) -> NDArray[np.float64]:
     """Return the unit vector (3,) that points up, in the optical frame.
 
     It is the direction least against all that is known: perpendicular to walls and to the planes of
-    vertical segments, near the floor's normal or, without a floor, near the image's upward one.
+    vertical segments, near the floor's normal or, without a floor, near the one that is expected.
     """
     floor = max(
-        (p for p in planes if p.normal @ _IMAGE_UP > np.cos(settings.max_floor_tilt)),
+        (p for p in planes if p.normal @ expected > np.cos(settings.max_floor_tilt)),
         key=lambda plane: plane.blocks,
         default=None,
     )
-    guess = _IMAGE_UP if floor is None else floor.normal
+    guess = expected if floor is None else floor.normal
     trust = settings.image_deviation if floor is None else settings.floor_deviation
     known = (np.eye(3) - np.outer(guess, guess)) / trust**2
     for plane in planes:

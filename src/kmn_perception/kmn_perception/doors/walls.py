@@ -14,6 +14,7 @@ from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import (
+    IMAGE_UP,
     HeightSource,
     find_camera_height,
     find_up,
@@ -99,7 +100,7 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     if frame.up is not None:
         wrong = find_contradiction(planes, up, frame.height, settings)
         if not wrong and frame.grey is not None:
-            wrong = doubt_tilt(up, _up(frame._replace(up=None), planes, settings), settings)
+            wrong = doubt_tilt(up, _seen_up(frame, planes, up, settings), settings)
         if wrong:
             raise NoWallError(wrong)
     walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
@@ -123,12 +124,17 @@ def _views(frames: Sequence[WallFrame], frame: Frame, settings: DoorSettings) ->
 
 def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:
     """Return the upward vector (3,) as it is given, or as the frame shows it."""
-    if frame.up is not None:
-        return frame.up
+    return _seen_up(frame, planes, IMAGE_UP, settings) if frame.up is None else frame.up
+
+
+def _seen_up(
+    frame: Frame, planes: Sequence[Plane], expected: NDArray[np.float64], settings: DoorSettings
+) -> NDArray[np.float64]:
+    """Return the upward vector (3,) that a frame shows near the one that is expected."""
     segments = None
     if frame.grey is not None:
         segments = line_segments(frame.grey, frame.camera, settings.vertical)
-    return find_up(planes, segments, settings.vertical)
+    return find_up(planes, segments, settings.vertical, expected)
 
 
 def _camera_height(

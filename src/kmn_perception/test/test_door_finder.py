@@ -211,6 +211,17 @@ def test_a_tilt_that_the_image_contradicts_is_refused(axis: int) -> None:
     assert "vertical lines in the image are tilted by" in refused.reason
 
 
+def test_a_height_that_the_floor_contradicts_is_refused() -> None:
+    room = sample_room(1, CAMERA, settings(), "door")
+    frame = render(room, 1)._replace(up=room.camera.pose[2, :3])
+    height = float(room.camera.pose[2, 3])
+    assert finder().find(frame._replace(height=height)).found
+    for wrong in (height - 0.1, height + 0.1):
+        refused = finder().find(frame._replace(height=wrong))
+        assert refused.status is DoorStatus.NO_DOOR
+        assert f"by the pose that was given for it {wrong:.2f} m" in refused.reason
+
+
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_a_pose_that_is_right_is_believed_however_the_camera_lies(turns: int) -> None:
     room = sample_room(1, CAMERA, settings(), "door")

@@ -17,7 +17,7 @@ from kmn_perception.doors.surfaces import (
     angle,
     fit_surfaces,
 )
-from kmn_perception.doors.upright import HeightSource, find_camera_height, find_up
+from kmn_perception.doors.upright import HeightSource, SeenHeight, find_camera_height, find_up
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.model.camera import Camera
 
@@ -100,7 +100,7 @@ def test_vertical_segments_tell_the_vertical_where_walls_are_wrong() -> None:
     assert error[1] < 0.3 < error[0]
 
 
-def camera_height(depth: np.ndarray, level: np.ndarray | None = None) -> float | None:
+def camera_height(depth: np.ndarray, level: np.ndarray | None = None) -> SeenHeight | None:
     rays, inverse, valid = blocks_of(depth).flat()
     settings = SETTINGS.floor
     return find_camera_height(
@@ -115,7 +115,17 @@ def camera_height(depth: np.ndarray, level: np.ndarray | None = None) -> float |
 
 
 def test_the_floor_tells_the_cameras_height() -> None:
-    assert camera_height(depth_of([wall(0.0, 2.5), floor()])) == pytest.approx(HEIGHT, abs=0.005)
+    seen = camera_height(depth_of([wall(0.0, 2.5), floor()]))
+    assert seen is not None
+    assert seen.metres == pytest.approx(HEIGHT, abs=0.005)
+
+
+def test_how_wrong_a_seen_height_is_under_a_wrong_calibration_is_known() -> None:
+    """The gain is the derivative of the height by an offset of all inverse depths."""
+    depth, offset = depth_of([wall(0.0, 2.5), floor()]), 0.01
+    right, wrong = camera_height(depth), camera_height(1.0 / (1.0 / depth - offset))
+    assert right is not None and wrong is not None
+    assert wrong.metres - right.metres == pytest.approx(offset * right.gain, rel=0.2)
 
 
 def test_a_table_is_not_the_floor_while_something_is_lower() -> None:
@@ -124,7 +134,9 @@ def test_a_table_is_not_the_floor_while_something_is_lower() -> None:
     everywhere = np.ones((480, 640), np.bool_)
     table = (columns < 420) & (rows > 330)
     depth = depth_of([wall(0.0, 2.5), floor(), floor(0.6)], [everywhere, everywhere, table])
-    assert camera_height(depth) == pytest.approx(HEIGHT, abs=0.01)
+    seen = camera_height(depth)
+    assert seen is not None
+    assert seen.metres == pytest.approx(HEIGHT, abs=0.01)
 
 
 def test_a_wall_that_reaches_the_images_border_is_no_floor() -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.planes import Plane
 from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.upright import SeenHeight
 
 _ABOVE_DOOR = 0.2  # metres by which a ceiling is above a door's top at least
 
@@ -38,12 +39,6 @@ def find_contradiction(
     if height is None:
         return ""
     near = settings.floor.max_deviation * height
-    off = min((plane.distance - height for plane in below), key=abs, default=0.0)
-    if abs(off) > near:
-        return (
-            f"the floor in view is {height + off:.2f} m below the camera, by the pose that was "
-            f"given for it {height:.2f} m"
-        )
     above = _level(planes, -up, settings)
     if not below and any(abs(plane.distance - height) < near for plane in above):
         return (
@@ -51,6 +46,19 @@ def find_contradiction(
             "the floor should be below: the camera may be upside down"
         )
     return ""
+
+
+def doubt_height(height: float, seen: SeenHeight, settings: DoorSettings) -> str:
+    """Return how the floor in view contradicts the camera's height that is given, metres."""
+    calibration = settings.calibration
+    expected = np.hypot(calibration.offset, calibration.floor) * seen.gain
+    allowed = settings.floor.contradiction * np.hypot(settings.fit.given_height, expected)
+    if abs(seen.metres - height) <= allowed:
+        return ""
+    return (
+        f"the floor in view is {seen.metres:.2f} m below the camera, by the pose that was given "
+        f"for it {height:.2f} m"
+    )
 
 
 def doubt_tilt(up: NDArray[np.float64], seen: NDArray[np.float64], settings: DoorSettings) -> str:

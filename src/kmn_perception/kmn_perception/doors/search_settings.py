@@ -75,11 +75,24 @@ class VerticalSettings:
 
 @dataclass(frozen=True)
 class FloorSettings:
-    """Heights of the camera above the floor that are sought, metres, and blocks that tell it."""
+    """The floor in view.
+
+    Attributes
+    ----------
+    heights
+        Of the camera above it that are sought, metres.
+    min_blocks
+        That agree about it.
+    max_deviation
+        Of the height that a single block tells, as a fraction of it.
+    contradiction
+        Difference of the height that is given from the one seen which refuses it, deviations.
+    """
 
     heights: Interval
     min_blocks: Count
     max_deviation: Fraction
+    contradiction: Positive
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum, auto
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -20,6 +21,21 @@ from kmn_perception.model.camera import Camera
 _REWEIGHTINGS = 12
 _UNDER, _FEW = 0.1, 0.4  # lower by this part of the height; how much of it reflections are
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
+
+
+class SeenHeight(NamedTuple):
+    """The camera's height above the floor in view.
+
+    Attributes
+    ----------
+    metres
+        The height.
+    gain
+        By how much it is wrong for an error of the floor's inverse depths, m^2.
+    """
+
+    metres: float
+    gain: float
 
 
 class HeightSource(Enum):
@@ -104,8 +120,8 @@ def find_camera_height(
     heights: tuple[float, float],
     min_blocks: int,
     max_deviation: float,
-) -> float | None:
-    """Return the camera's height above the floor, metres, or None where no floor is in view.
+) -> SeenHeight | None:
+    """Return the camera's height above the floor, or None where no floor is in view.
 
     The floor is the surface on which blocks below the camera agree about its height, and below
     which nothing is: a table is not the floor.
@@ -122,13 +138,14 @@ def find_camera_height(
         Of the height that a single block tells, as a fraction of it.
     """
     below = blocks_up < 0.0
-    over = inverse[below] / -blocks_up[below]  # 1 / height of a camera above a floor there
-    deviation = noise / -blocks_up[below]
+    drop = -blocks_up[below]
+    over = inverse[below] / drop  # 1 / height of a camera above a floor there
+    deviation = noise / drop
     low, high = 1.0 / heights[1], 1.0 / heights[0]
     told = deviation < max_deviation * over
     everything = over[told], deviation[told]
     told &= level[below]
-    over, deviation = over[told], deviation[told]
+    over, deviation, drop = over[told], deviation[told], drop[told]
     if not len(over):
         return None
     grid = np.linspace(low, high, 400)
@@ -147,5 +164,5 @@ def find_camera_height(
                 value = float(np.average(over[near], weights=deviation[near] ** -2.0))
         under = everything[0] < (1.0 - _UNDER) * value - 3.0 * everything[1]
         if under.sum() < _FEW * near.sum():
-            return 1.0 / value
+            return SeenHeight(1.0 / value, 1.0 / (value**2 * float(np.median(drop[near]))))
     return None

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.camera_check import doubt_tilt, find_contradiction
+from kmn_perception.doors.camera_check import doubt_height, doubt_tilt, find_contradiction
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.planes import Plane, find_planes
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import (
     IMAGE_UP,
     HeightSource,
+    SeenHeight,
     find_camera_height,
     find_up,
     line_segments,
@@ -107,9 +108,14 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     if not walls:
         raise NoWallError("no wall is seen")
     height, source = frame.height, HeightSource.GIVEN
-    if height is None:
-        height, source = _camera_height(blocks, up, walls, settings), HeightSource.SEEN
-    if height is None:
+    seen = _camera_height(blocks, up, walls, settings)
+    if height is not None and seen is not None:
+        wrong = doubt_height(height, seen, settings)
+        if wrong:
+            raise NoWallError(wrong)
+    elif height is None and seen is not None:
+        height, source = seen.metres, HeightSource.SEEN
+    elif height is None:
         height, source = settings.prior.handle_height[0], HeightSource.USUAL
     frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
     views = _views(frames, frame, settings)
@@ -139,7 +145,7 @@ def _seen_up(
 
 def _camera_height(
     blocks: Blocks, up: NDArray[np.float64], walls: Sequence[Plane], settings: DoorSettings
-) -> float | None:
+) -> SeenHeight | None:
     """Return the camera's height above the floor, from what lies on no wall."""
     rays, inverse, valid = blocks.flat()
     level = np.ones_like(valid)

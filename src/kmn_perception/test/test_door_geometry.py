@@ -108,6 +108,6 @@ def test_a_handle_at_the_left_is_the_mirror_image() -> None:
 def test_covariances_follow_a_linear_function() -> None:
     matrix = np.array([[1.0, 2.0, 0.0], [0.5, -1.0, 3.0]])
     covariance = np.diag([0.1, 0.2, 0.3]) + 0.02
-    value, found = propagate(lambda m: matrix @ m, np.array([1.0, 2.0, 3.0]), covariance)
+    value, found = propagate(lambda m: m @ matrix.T, np.array([1.0, 2.0, 3.0]), covariance)
     np.testing.assert_allclose(value, matrix @ [1.0, 2.0, 3.0])
     np.testing.assert_allclose(found, matrix @ covariance @ matrix.T, rtol=1e-6)

@@ -113,10 +113,10 @@ def score_of(
         default=0.0,
     )
     edge = round(0.3 * reach)
-    panel = slice(first + edge, last - edge)
+    hidden, hollow = pieces.shares_between(first + edge, last - edge)
     contrast = sum(min(line.contrast, weight.max_contrast) for line in (left, right))
     # A recess: nearer outside, at both edges.
-    step = float(np.clip(min(left.step, -right.step) / settings.lines.min_step, 0.0, 2.0))
+    step = min(max(min(left.step, -right.step) / settings.lines.min_step, 0.0), 2.0)
     return (
         left.coverage
         + right.coverage
@@ -124,7 +124,7 @@ def score_of(
         + weight.contrast * contrast
         + weight.step * step
         - weight.inner_line * inner
-        - weight.hollow * float(pieces.hollow[panel].mean())
-        - weight.hidden * float(pieces.hidden[panel].mean())
+        - weight.hollow * hollow
+        - weight.hidden * hidden
         - weight.width * abs(width - weight.expected_width)
     )

@@ -39,83 +39,83 @@ class View2d(NamedTuple):
     right: float
     away: float
 
-    def to_world(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return world x, y of a vector (right, away)."""
+    def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return world x, y of vectors (..., 2), right and away."""
         length = np.hypot(self.right, self.away)
-        x = (point[0] * self.right + point[1] * self.away) / length
-        y = (point[1] * self.right - point[0] * self.away) / length
-        return np.array([x, y])
+        to_world = np.array([[self.right, -self.away], [self.away, self.right]]) / length
+        return points @ to_world
 
 
 class DoorShape(NamedTuple):
-    """Points of the panel's front, seen from above: (right, away) in the wall's axes, metres."""
+    """Points (..., 2) of the panel's front, seen from above: (right, away) in the wall's axes.
+
+    Metres and radians; heights, opening and recess (...,).
+    """
 
     left: NDArray[np.float64]
     right: NDArray[np.float64]
     handle: NDArray[np.float64]
-    handle_height: float
-    top: float
-    opening: float
-    recess: float
+    handle_height: NDArray[np.float64]
+    top: NDArray[np.float64]
+    opening: NDArray[np.float64]
+    recess: NDArray[np.float64]
 
 
 def door_shape(m: NDArray[np.float64], handle_left: bool, ajar: bool) -> DoorShape:
-    """Return the door's points from the measurements (13,), see `MEASURED`."""
-    wall, panel = m[0:2], m[2:4]
-    toward = -wall / np.linalg.norm(wall)  # the wall's normal, towards the camera
+    """Return the door's points from the measurements (..., 13), see `MEASURED`."""
+    wall, panel = m[..., 0:2], m[..., 2:4]
+    toward = -_unit(wall)  # the wall's normal, towards the camera
     corners = []
-    for direction, on_panel in ((m[5], m[7]), (m[6], m[8])):
-        ray = np.array([direction, 1.0])
-        on_wall = ray / (wall @ ray)
-        seen = ray / (panel @ ray)
+    for direction, on_panel in ((m[..., 5], m[..., 7]), (m[..., 6], m[..., 8])):
+        ray = _ray(direction)
+        on_wall = ray / _dot(wall, ray)
+        seen = ray / _dot(panel, ray)
         # The frame's edge, moved along the wall's normal onto the panel.
-        behind = on_wall + toward * (1.0 - panel @ on_wall) / (panel @ toward)
-        corners.append((1.0 - on_panel) * behind + on_panel * seen)
+        behind = on_wall + toward * (1.0 - _dot(panel, on_wall)) / _dot(panel, toward)
+        share = on_panel[..., None]
+        corners.append((1.0 - share) * behind + share * seen)
     left, right = corners
-    turn = np.arctan2(panel[0], panel[1]) - np.arctan2(wall[0], wall[1])
-    ray = np.array([m[10], 1.0])
-    grip = ray * (1.0 - m[12] * np.linalg.norm(panel)) / (panel @ ray)
+    turn = np.arctan2(panel[..., 0], panel[..., 1]) - np.arctan2(wall[..., 0], wall[..., 1])
+    ray = _ray(m[..., 10])
+    grip = ray * (1.0 - m[..., 12:13] * _length(panel)) / _dot(panel, ray)
     hinge = right if handle_left else left
     at = hinge if ajar else 0.5 * (left + right)
-    recess = (wall @ at - 1.0) / np.linalg.norm(wall)
-    over = np.array([0.5 * (m[5] + m[6]), 1.0])
-    top = 1.0 / m[4] + m[9] / (wall @ over)
-    height = 1.0 / m[4] + m[11] * grip[1]
-    return DoorShape(left, right, grip, height, top, turn, recess)
+    recess = (_dot(wall, at) - 1.0) / _length(wall)
+    over = _ray(0.5 * (m[..., 5] + m[..., 6]))
+    top = 1.0 / m[..., 4] + m[..., 9] / _dot(wall, over)[..., 0]
+    height = 1.0 / m[..., 4] + m[..., 11] * grip[..., 1]
+    return DoorShape(left, right, grip, height, top, turn, recess[..., 0])
 
 
 def door_values(
     m: NDArray[np.float64], handle_left: bool, ajar: bool, look: View2d
 ) -> NDArray[np.float64]:
-    """Return the door's parameters (9,), see `DOOR`, from measurements (13,), see `MEASURED`."""
+    """Return the parameters (..., 9), see `DOOR`, of measurements (..., 13), see `MEASURED`."""
     shape = door_shape(m, handle_left, ajar)
-    along = shape.right - shape.left
-    width = float(np.linalg.norm(along))
-    along = along / width
+    width = _length(shape.right - shape.left)
+    along = (shape.right - shape.left) / width
     latch, hinge = (shape.left, shape.right) if handle_left else (shape.right, shape.left)
-    inset = float((shape.handle - latch) @ along) * (1.0 if handle_left else -1.0)
-    axis = m[0:2] / np.linalg.norm(m[0:2]) if ajar else m[2:4] / np.linalg.norm(m[2:4])
-    across = np.array([axis[1], -axis[0]])  # along the wall, to the right
+    inset = _dot(shape.handle - latch, along)[..., 0] * (1.0 if handle_left else -1.0)
+    panel = _unit(m[..., 2:4])
+    axis = _unit(m[..., 0:2]) if ajar else panel
+    across = axis @ np.array([[0.0, -1.0], [1.0, 0.0]])  # along the wall, to the right
     middle = hinge + across * (-0.5 if handle_left else 0.5) * width
-    panel = m[2:4] / np.linalg.norm(m[2:4])
     middle = middle + panel * PANEL_FRONT  # it turns about a point of its middle plane
-    x, y = look.to_world(middle)
-    heading = look.to_world(axis)
-    yaw = np.arctan2(heading[1], heading[0])
+    place, heading = look.to_world(middle), look.to_world(axis)
     door_height = shape.top - HEIGHT
-    handle_z = shape.handle_height - HANDLE_HEIGHT - 0.5 * door_height
-    return np.array(
+    return np.stack(
         [
-            x,
-            y,
-            yaw,
+            place[..., 0],
+            place[..., 1],
+            np.arctan2(heading[..., 1], heading[..., 0]),
             door_height,
-            width - WIDTH,
+            width[..., 0] - WIDTH,
             inset - HANDLE_INSET,
-            handle_z,
+            shape.handle_height - HANDLE_HEIGHT - 0.5 * door_height,
             shape.opening if handle_left else -shape.opening,
             shape.recess,
-        ]
+        ],
+        axis=-1,
     )
 
 
@@ -124,12 +124,35 @@ def propagate(
     at: NDArray[np.float64],
     covariance: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a function's value and the covariance that it inherits, by its derivatives."""
+    """Return a function's value and the covariance that it inherits, by its derivatives.
+
+    Parameters
+    ----------
+    function
+        Of vectors (..., N), for all at once.
+    """
     steps = 1e-2 * np.sqrt(np.diag(covariance)) + 1e-9
-    columns = []
-    for i, step in enumerate(steps):
-        shift = np.zeros_like(at)
-        shift[i] = step
-        columns.append((function(at + shift) - function(at - shift)) / (2.0 * step))
-    jacobian = np.stack(columns, axis=-1)
-    return function(at), jacobian @ covariance @ jacobian.T
+    shifts = np.diag(steps)
+    values = function(np.concatenate([at[None], at + shifts, at - shifts]))
+    above, below = np.split(values[1:], 2)
+    jacobian = ((above - below) / (2.0 * steps[:, None])).T
+    return values[0], jacobian @ covariance @ jacobian.T
+
+
+def _ray(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rays (..., 2), right and away, of directions (...,)."""
+    return np.stack([direction, np.ones_like(direction)], axis=-1)
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the products (..., 1) of vectors (..., 2)."""
+    return a[..., :1] * b[..., :1] + a[..., 1:] * b[..., 1:]
+
+
+def _length(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lengths (..., 1) of vectors (..., 2)."""
+    return np.hypot(a[..., :1], a[..., 1:])
+
+
+def _unit(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    return a / _length(a)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.search_settings import PlaneSettings
@@ -61,25 +60,22 @@ class Blocks:
         return self.rays.reshape(-1, 3), self.inverse.reshape(-1), self.valid.reshape(-1)
 
 
-@njit(cache=True)
 def _medians(
     depth: NDArray[np.float32], size: int, least: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return median and spread (from the 10th to the 90th percentile) of 1 / z of each block."""
     rows, columns = depth.shape[0] // size, depth.shape[1] // size
-    inverse, spread = np.zeros((rows, columns)), np.zeros((rows, columns))
-    values = np.empty(size * size)
-    for i in range(rows):
-        for j in range(columns):
-            count = 0
-            for v in range(i * size, (i + 1) * size):
-                for u in range(j * size, (j + 1) * size):
-                    z = depth[v, u]
-                    if z > 0.0:  # neither none nor NaN
-                        values[count] = 1.0 / z
-                        count += 1
-            if count >= least:
-                part = np.sort(values[:count])
-                inverse[i, j] = part[count // 2]
-                spread[i, j] = part[(9 * count) // 10] - part[count // 10]
-    return inverse, spread
+    blocks = depth[: rows * size, : columns * size].reshape(rows, size, columns, size)
+    blocks = blocks.swapaxes(1, 2).reshape(rows, columns, size * size)
+    measured = blocks > 0.0  # neither none nor NaN
+    z = np.sort(np.where(measured, blocks, np.float32(np.inf)), axis=2)
+    count = measured.sum(axis=2)
+
+    def inverse(rank: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the inverse depths (rows, columns) that so many of a block are below."""
+        at = np.maximum(count - 1 - rank, 0)[..., None]
+        return 1.0 / np.take_along_axis(z, at, axis=2)[..., 0].astype(np.float64)
+
+    spread = inverse((9 * count) // 10) - inverse(count // 10)
+    enough = count >= least
+    return np.where(enough, inverse(count // 2), 0.0), np.where(enough, spread, 0.0)

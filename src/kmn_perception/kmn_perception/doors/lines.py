@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import cv2
@@ -72,6 +73,17 @@ class Pieces:
     sharp: NDArray[np.float32]
     rows: NDArray[np.int64]
 
+    def shares_between(self, first: int, last: int) -> tuple[float, float]:
+        """Return the mean shares that are hidden and hollow of columns first to last - 1."""
+        hidden, hollow = (self._sums[:, last] - self._sums[:, first]) / (last - first)
+        return float(hidden), float(hollow)
+
+    @cached_property
+    def _sums(self) -> NDArray[np.float64]:
+        """(2, columns + 1) sums of hidden and hollow up to each column."""
+        sums = np.cumsum([self.hidden, self.hollow], axis=1, dtype=np.float64)
+        return np.pad(sums, ((0, 0), (1, 0)))
+
 
 def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSettings) -> Pieces:
     """Take gradient and depth of a view's columns.
@@ -87,9 +99,9 @@ def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSe
     rows = np.floor((view.z - low) / settings.piece).astype(np.int64)
     rows[(rows < 0) | (rows >= count)] = -1
     body = low + settings.piece * (np.arange(count) + 0.5) < high
-    hides = np.nan_to_num(view.offset, nan=0.0) > before
+    hides = view.offset > before
     hides = cv2.dilate(hides.astype(np.uint8), np.ones((_SPREAD, _SPREAD), np.uint8)) > 0
-    hollow = np.nan_to_num(view.offset, nan=0.0) < -behind
+    hollow = view.offset < -behind
     usable = view.inside & ~hides
     if view.grey is None:
         sharp, known = np.zeros_like(view.offset), np.zeros_like(usable)
@@ -152,14 +164,20 @@ def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSetting
     ]
 
 
-def gaussian_steps(grey: NDArray[np.float32], smoothing: float) -> NDArray[np.float32]:
-    """Return the step to the right about each pixel: a Gaussian's derivative, scaled to steps."""
+def gaussian_steps(
+    grey: NDArray[np.float32], smoothing: float, axis: int = 1
+) -> NDArray[np.float32]:
+    """Return the step about each pixel to the right (axis 1) or downwards (axis 0).
+
+    It is a Gaussian's derivative, scaled to steps.
+    """
     reach = int(np.ceil(3.0 * smoothing))
     x = np.arange(-reach, reach + 1)
     weights = x * np.exp(-0.5 * (x / smoothing) ** 2)
     weights *= smoothing * np.sqrt(2.0 * np.pi) / (weights * x).sum()
-    kernel = weights[None].astype(np.float32)
-    steps = cv2.filter2D(grey, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    along, across = weights.astype(np.float32), np.ones(1, np.float32)
+    kernels = (along, across) if axis == 1 else (across, along)
+    steps = cv2.sepFilter2D(grey, -1, *kernels, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(steps, dtype=np.float32)
 
 
@@ -207,11 +225,15 @@ def _steps(
 def _sums(
     values: NDArray[np.float32] | NDArray[np.bool_], rows: NDArray[np.int64], count: int
 ) -> NDArray[np.float32]:
-    """Return sums (count, columns) over the rows of each piece."""
-    total = np.zeros((count, values.shape[1]), np.float32)
-    for k in np.unique(rows[rows >= 0]):
-        total[k] = values[rows == k].sum(axis=0)
-    return total
+    """Return sums (count, columns) over the rows of each piece, which lie together."""
+    numbers = values.view(np.uint8) if values.dtype == np.bool_ else values
+    sums = np.zeros((count, values.shape[1]), np.float32)
+    for k in range(count):
+        piece = np.flatnonzero(rows == k)
+        if len(piece):
+            of_piece = numbers[piece[0] : piece[-1] + 1]
+            sums[k] = cv2.reduce(of_piece, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32F)[0]
+    return sums
 
 
 def largest_near(values: NDArray[np.float32], size: int = 9) -> NDArray[np.float32]:

@@ -103,7 +103,7 @@ def _rows(
     """Return each row's step of grey (of either sign), and whether enough of the width shows it."""
     assert view.grey is not None
     shade = np.where(inside, view.grey[:, inner], np.float32(0.0))
-    steps = gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T
+    steps = gaussian_steps(shade, _SMOOTHING, axis=0)
     known = cv2.erode(inside.astype(np.uint8), np.ones((13, 1), np.uint8)) > 0
     size = max(1, round(_PIECE / abs(float(view.s[1] - view.s[0]))))
     count = steps.shape[1] // size

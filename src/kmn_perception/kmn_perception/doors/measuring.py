@@ -113,7 +113,7 @@ def _edge_deviations(
 
     def corners(m: NDArray[np.float64]) -> NDArray[np.float64]:
         shape = door_shape(m, handle_left, ajar)
-        return np.concatenate([shape.left, shape.right])
+        return np.concatenate([shape.left, shape.right], axis=-1)
 
     variances = np.diag(propagate(corners, measured, own)[1])
     return float(np.sqrt(variances[:2].sum())), float(np.sqrt(variances[2:].sum()))

@@ -34,13 +34,16 @@ def with_proposals(
     pixel = float(view.s[1] - view.s[0])
     narrow, wide = settings.verdict.width
     slack = settings.lines.tie
-    for first in _peaks(proposals.left, settings.network.peaks):
-        for last in _peaks(proposals.right, settings.network.peaks):
-            edges = [_edge(view, pieces, lines, at, settings) for at in (first, last)]
-            width = (edges[1].column - edges[0].column) * pixel
+    lefts, rights = (
+        [_edge(view, pieces, lines, at, settings) for at in _peaks(side, settings.network.peaks)]
+        for side in (proposals.left, proposals.right)
+    )
+    for left in lefts:
+        for right in rights:
+            width = (right.column - left.column) * pixel
             if narrow - slack <= width <= wide + slack:
-                score = score_of(edges[0], edges[1], width, lines, pieces, pixel, settings)
-                candidate = Candidate(score, view, pieces, edges[0], edges[1], lines)
+                score = score_of(left, right, width, lines, pieces, pixel, settings)
+                candidate = Candidate(score, view, pieces, left, right, lines)
                 known.append(_judged(candidate, proposals, settings))
     known.sort(key=lambda candidate: -candidate.score)
     return distinct(known, slack / pixel)[: settings.candidates]

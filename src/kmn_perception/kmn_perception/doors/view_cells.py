@@ -34,12 +34,12 @@ def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]
     shade = np.zeros_like(view.offset) if view.grey is None else view.grey
     within = cv2.erode(view.inside.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
     right = _whole(gaussian_steps(shade, _SMOOTHING) * within)
-    down = _whole(gaussian_steps(np.ascontiguousarray(shade.T), _SMOOTHING).T * within)
+    down = _whole(gaussian_steps(shade, _SMOOTHING, axis=0) * within)
     columns = right.shape[1] // _WIDE
     right = _mean_to(right, (right.shape[1], ROWS)).reshape(ROWS, columns, _WIDE)
     down = _mean_to(down, (columns, len(down))).reshape(ROWS, _HIGH, columns)
     measured = np.isfinite(view.offset)
-    offset = np.nan_to_num(view.offset, nan=0.0)
+    offset = np.where(measured, view.offset, np.float32(0.0))
     share = _mean(measured.astype(np.float32))
     scaled = _mean(np.clip(offset / noise, -_OFFSET, _OFFSET)) / np.maximum(share, 1e-3)
     channels = [

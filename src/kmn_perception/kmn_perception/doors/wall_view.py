@@ -116,28 +116,20 @@ def resample(
     camera: Camera,
 ) -> WallView:
     """Return what is seen of a plane at columns s and rows z, metres; see `view_wall`."""
-    start = frame.points(s[:1], z[:1])[0]
-    # Pixel times depth, depth: affine in columns and rows.
-    origin = camera.matrix @ start
-    step_s = camera.matrix @ frame.right
-    step_z = camera.matrix @ frame.up
-    ds, dz = (s - s[0]).astype(np.float32), (z - z[0]).astype(np.float32)
-    scaled = [
-        np.float32(origin[k]) + ds * np.float32(step_s[k]) + (dz * np.float32(step_z[k]))[:, None]
-        for k in range(3)
-    ]
-    plane_depth = np.maximum(scaled[2], np.float32(1e-3))
-    u, v = scaled[0] / plane_depth, scaled[1] / plane_depth
+    scaled = _scaled_pixels(frame, s, z, camera)
+    inverse = 1.0 / np.maximum(scaled[2], np.float32(1e-3))
+    u, v = scaled[0] * inverse, scaled[1] * inverse
     inside = (scaled[2] > camera.near) & (u > 0.0) & (u < camera.width - 1.0)
     inside &= (v > 0.0) & (v < camera.height - 1.0)
     seen = cv2.remap(depth, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
-    with np.errstate(divide="ignore"):
-        offset = 1.0 / seen - 1.0 / plane_depth
-    offset[(seen <= 0.0) | ~inside] = np.nan
+    measured = (seen > 0.0) & inside
+    offset = np.full_like(seen, np.nan)
+    np.divide(1.0, seen, out=offset, where=measured)
+    offset -= inverse
     shade: NDArray[np.float32] | None = None
     if grey is not None:
-        seen_grey = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        shade = np.log(np.maximum(seen_grey, 0.0) + np.float32(DARKEST)).astype(np.float32)
+        shade = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shade = np.log(np.maximum(shade, 0.0) + np.float32(DARKEST))
     # Along a level line: the change of direction with s, in pixels.
     footprint = (frame.distance**2 + s**2) / frame.distance / camera.fx
     return WallView(frame, s, z, shade, offset, inside, footprint)
@@ -148,12 +140,22 @@ def _columns_in_view(
 ) -> NDArray[np.float64]:
     """Return the columns (metres) of which something is in the image."""
     s = np.arange(-settings.reach, settings.reach, settings.pixel, dtype=np.float64)
-    probes = np.linspace(*settings.heights, 13)
-    points = frame.points(*np.broadcast_arrays(s, probes[:, None]))
-    depth = points[..., 2]
-    ahead = depth > camera.near
-    pixels = points @ camera.matrix.T / np.where(ahead, depth, 1.0)[..., None]
-    inside = ahead & (pixels[..., 0] > 0.0) & (pixels[..., 0] < camera.width - 1.0)
-    inside &= (pixels[..., 1] > 0.0) & (pixels[..., 1] < camera.height - 1.0)
+    u, v, depth = _scaled_pixels(frame, s, np.linspace(*settings.heights, 13), camera)
+    inside = (depth > camera.near) & (u > 0.0) & (u < (camera.width - 1.0) * depth)
+    inside &= (v > 0.0) & (v < (camera.height - 1.0) * depth)
     visible = np.flatnonzero(inside.any(axis=0) & (np.hypot(s, frame.distance) < settings.reach))
     return s[visible[0] : visible[-1] + 1] if len(visible) else s[:0]
+
+
+def _scaled_pixels(
+    frame: WallFrame, s: NDArray[np.float64], z: NDArray[np.float64], camera: Camera
+) -> list[NDArray[np.float32]]:
+    """Return column times depth, row times depth, and depth (rows, columns) of a plane's points.
+
+    They are affine in the columns s and rows z, metres.
+    """
+    origin = camera.matrix @ frame.points(s[:1], z[:1])[0]
+    step_s, step_z = camera.matrix @ frame.right, camera.matrix @ frame.up
+    along = origin[:, None] + step_s[:, None] * (s - s[0])
+    over = step_z[:, None] * (z - z[0])
+    return [np.add.outer(over[k].astype(np.float32), along[k].astype(np.float32)) for k in range(3)]

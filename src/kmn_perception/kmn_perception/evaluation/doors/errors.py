@@ -99,8 +99,10 @@ def errors(
     """Compare an estimate with a label; deviations follow from its covariance by derivatives."""
 
     def compared(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        place = door_place(values, estimate.handle_side, estimate.camera_pose, model)
-        return compare(place, label)
+        places = (
+            door_place(door, estimate.handle_side, estimate.camera_pose, model) for door in values
+        )
+        return np.stack([compare(place, label) for place in places])
 
     found, covariance = propagate(compared, estimate.values, estimate.covariance)
     stated = np.sqrt(np.diag(covariance))

@@ -57,11 +57,14 @@ def find_lintel(
     if view.grey is None:
         return Lintel(None, np.inf, 0.0)
     low, high = heights
-    contrast, coverage = _rows(view, inner, inside, settings)
+    steps = _steps(view)
+    contrast, coverage = _rows(view, steps, inner, settings)
     likely = _likely(candidate)
     if likely is not None and likely[-1] > 0.5:
         return Lintel(None, np.inf, seen_to)
-    evidence = np.where((view.z > low) & (view.z < high) & coverage, contrast, 0.0)
+    evidence = np.where((view.z > low) & (view.z < high) & coverage, np.abs(contrast), 0.0)
+    passing = _passing(view, steps, (left, right), contrast, settings.beside)
+    evidence = evidence * (1.0 - settings.passing * passing)
     if likely is not None:
         evidence = evidence * (likely[:-1] + _UNLIKELY)
     rows = evidence.astype(np.float32)
@@ -97,13 +100,18 @@ def _likely(candidate: Candidate) -> NDArray[np.float64] | None:
     return np.append(cells[at], probabilities[-1])
 
 
-def _rows(
-    view: WallView, inner: slice, inside: NDArray[np.bool_], settings: LintelSettings
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return each row's step of grey (of either sign), and whether enough of the width shows it."""
+def _steps(view: WallView) -> NDArray[np.float32]:
+    """Return the steps (rows, columns) of grey downwards."""
     assert view.grey is not None
-    shade = np.where(inside, view.grey[:, inner], np.float32(0.0))
-    steps = gaussian_steps(shade, _SMOOTHING, axis=0)
+    shade = np.where(view.inside, view.grey, np.float32(0.0))
+    return gaussian_steps(shade, _SMOOTHING, axis=0)
+
+
+def _rows(
+    view: WallView, steps: NDArray[np.float32], inner: slice, settings: LintelSettings
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return each row's step of grey, and whether enough of the width shows it."""
+    inside, steps = view.inside[:, inner], steps[:, inner]
     known = cv2.erode(inside.astype(np.uint8), np.ones((13, 1), np.uint8)) > 0
     size = max(1, round(_PIECE / abs(float(view.s[1] - view.s[0]))))
     count = steps.shape[1] // size
@@ -119,6 +127,36 @@ def _rows(
         hits = ((near > settings.min_contrast) & told).sum(axis=1)
         contrast = np.where(told, np.clip(sign * pieces, -1.0, 1.0), 0.0).sum(axis=1) / visible
         good = (hits >= settings.min_coverage * visible) & (hits >= settings.min_width * count)
-        best = np.where(good, np.maximum(best, contrast), best)
+        best = np.where(good & (contrast > np.abs(best)), sign * contrast, best)
         enough |= good
     return best, enough
+
+
+def _passing(
+    view: WallView,
+    steps: NDArray[np.float32],
+    edges: tuple[int, int],
+    contrast: NDArray[np.float64],
+    beside: tuple[float, float],
+) -> NDArray[np.float64]:
+    """Return how much (0 to 1) of each row's step goes on beyond both upright edges.
+
+    The panel's top ends at its edges, that of a frame at the frame's.
+
+    Parameters
+    ----------
+    beside
+        Distances from the edges between which it is looked for, metres.
+    """
+    pixel = float(view.s[1] - view.s[0])
+    near, far = (max(1, round(distance / pixel)) for distance in beside)
+    left, right = edges
+    share = np.ones(len(view.z))
+    for strip in (slice(max(left - far, 0), max(left - near, 0)), slice(right + near, right + far)):
+        if view.inside[:, strip].shape[1] == 0:
+            return np.zeros(len(view.z))
+        step = (steps[:, strip].mean(axis=1) * np.sign(contrast)).astype(np.float32)
+        step = cv2.dilate(step[:, None], np.ones((5, 1), np.uint8))[:, 0]  # may be aslant
+        seen = view.inside[:, strip].all(axis=1)
+        share = np.minimum(share, seen * step / np.maximum(np.abs(contrast), 1e-6))
+    return np.clip(share, 0.0, 1.0)

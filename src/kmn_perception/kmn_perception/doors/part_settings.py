@@ -98,6 +98,10 @@ class LintelSettings:
         Standard deviation of its height, metres.
     sure, hint_noise
         Probability from which on the network alone tells it, and its deviation then, metres.
+    beside
+        Distances from the upright edges between which a frame's top goes on, metres.
+    passing
+        By how much a line that goes on there, as clear as within, counts less.
     """
 
     heights: Interval
@@ -107,3 +111,5 @@ class LintelSettings:
     noise: Positive
     sure: Fraction
     hint_noise: Positive
+    beside: Interval
+    passing: Fraction

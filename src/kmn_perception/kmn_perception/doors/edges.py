@@ -41,7 +41,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
     """Return how far other lines that may be the edge lie from the one that was taken, metres.
 
     Frame, panel and what stands beside them have edges side by side. Each counts by the square of
-    its contrast and, with a network, by the probability that it is the door's.
+    its contrast and, with a network, by a power of the probability that it is the door's.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
         Where the other edge of the same reveal is seen, see `both_seen`; that is no rival.
     """
     chosen, view = candidate.edge(side), candidate.view
-    pixel = float(view.s[1] - view.s[0])
+    pixel, power = float(view.s[1] - view.s[0]), settings.network.power
     weights, offsets = [], []
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
@@ -61,7 +61,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
         ):
             continue
         contrast = min(line.contrast, settings.lines.equally_clear)
-        weights.append((contrast * _probability(candidate, side, line.column)) ** 2)
+        weights.append(contrast**2 * _probability(candidate, side, line.column) ** power)
         offsets.append(offset)
     if not sum(weights):
         return 0.0

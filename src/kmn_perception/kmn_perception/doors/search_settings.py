@@ -195,8 +195,11 @@ class NetworkSettings(NamedTuple):
         Of a pair of edges that is measured at all.
     snap
         Distance within which an edge of the view is the one that is meant, metres.
+    power
+        Of its probability by which lines that may be the same edge are weighed.
     """
 
     peaks: Count
     min_confidence: Fraction
     snap: Positive
+    power: Positive

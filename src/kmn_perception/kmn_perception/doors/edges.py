@@ -8,7 +8,7 @@ import numpy as np
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
-from kmn_perception.doors.proposals import near
+from kmn_perception.doors.proposals import near, weight_of
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallView
@@ -40,8 +40,8 @@ def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tup
 def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: DoorSettings) -> float:
     """Return how far other lines that may be the edge lie from the one that was taken, metres.
 
-    Frame, panel and what stands beside them have edges side by side. Each counts by the square of
-    its contrast and, with a network, by a power of the probability that it is the door's.
+    Frame, panel and what stands beside them have edges side by side. Each counts by how
+    clear it is and, with a network, how probably the door's, see `weight_of`.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
         Where the other edge of the same reveal is seen, see `both_seen`; that is no rival.
     """
     chosen, view = candidate.edge(side), candidate.view
-    pixel, power = float(view.s[1] - view.s[0]), settings.network.power
+    pixel = float(view.s[1] - view.s[0])
     weights, offsets = [], []
     for line in candidate.lines:
         offset = (line.column - chosen.column) * pixel
@@ -60,8 +60,8 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
             abs(place - other) <= settings.reveal.line for other in pair
         ):
             continue
-        contrast = min(line.contrast, settings.lines.equally_clear)
-        weights.append(contrast**2 * _probability(candidate, side, line.column) ** power)
+        probability = _probability(candidate, side, line.column)
+        weights.append(weight_of(line.contrast, probability, settings))
         offsets.append(offset)
     if not sum(weights):
         return 0.0

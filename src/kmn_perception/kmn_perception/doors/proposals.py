@@ -16,6 +16,7 @@ from kmn_perception.doors.wall_view import WallView
 from kmn_perception.network.wall_network import KINDS, Proposals, WallNetwork, propose
 
 _LEAST = 1e-6  # probability of what a network finds impossible
+_STEP_CLARITY = 0.05  # what a standard deviation of a step in depth is worth as contrast
 _BESIDE = 6  # cells beside an edge where what stands out may be seen
 
 
@@ -35,8 +36,8 @@ def with_proposals(
     narrow, wide = settings.verdict.width
     slack = settings.lines.tie
     lefts, rights = (
-        [_edge(view, pieces, lines, at, settings) for at in _peaks(side, settings.network.peaks)]
-        for side in (proposals.left, proposals.right)
+        [_edge(view, pieces, lines, p, at, settings) for at in _peaks(p, settings.network.peaks)]
+        for p in (proposals.left, proposals.right)
     )
     for left in lefts:
         for right in rights:
@@ -53,7 +54,7 @@ def _judged(candidate: Candidate, proposals: Proposals, settings: DoorSettings) 
     view = candidate.view
     left = round(cell_of(view, candidate.left.column))
     right = round(cell_of(view, candidate.right.column))
-    confidence = near(proposals.left, left) * near(proposals.right, right)
+    confidence = near(proposals.left, left, 1) * near(proposals.right, right, 1)
     least = settings.network.min_confidence
     opinion = 1.0 - np.log(max(confidence, least)) / np.log(least)
     score = candidate.score + settings.score.network * float(opinion)
@@ -118,13 +119,37 @@ def _peaks(probabilities: NDArray[np.float32], count: int) -> list[int]:
 
 
 def _edge(
-    view: WallView, pieces: Pieces, lines: Sequence[Line], at: int, settings: DoorSettings
+    view: WallView,
+    pieces: Pieces,
+    lines: Sequence[Line],
+    probabilities: NDArray[np.float32],
+    at: int,
+    settings: DoorSettings,
 ) -> Line:
-    """Return the clearest edge of the view near a cell, or a place without one."""
+    """Return the edge of the view that is likeliest near a cell, or a place without one."""
     column = int(round(float(column_of(view, np.array(float(at))))))
-    reach = settings.network.snap / float(view.s[1] - view.s[0])
-    close = [line for line in lines if abs(line.column - column) <= reach]
-    if close:
-        return max(close, key=lambda line: min(line.contrast, 1.0) + 0.05 * abs(line.step))
     column = min(max(column, 0), len(view.s) - 1)
-    return Line(column, 1, 0.0, 0.0, float(pieces.step[column]))
+    reach = settings.network.snap / float(view.s[1] - view.s[0])
+    unmarked = Line(column, 1, 0.0, 0.0, float(pieces.step[column]))
+    near_by = [line for line in lines if abs(line.column - column) <= reach]
+
+    def weight(line: Line) -> float:
+        clarity = max(line.contrast + _STEP_CLARITY * abs(line.step), settings.lines.min_contrast)
+        probability = near(probabilities, round(cell_of(view, line.column)), 1)
+        return weight_of(clarity, probability, settings)
+
+    return max([unmarked, *near_by], key=weight)
+
+
+def weight_of(clarity: float, probability: float, settings: DoorSettings) -> float:
+    """Return the weight of a line among those that may be the same edge.
+
+    Parameters
+    ----------
+    clarity
+        Its step of the logarithm of grey, or what counts as much.
+    probability
+        By the network, which has seen how clear it is, and counts more.
+    """
+    clarity = min(clarity, settings.lines.equally_clear)
+    return float(clarity**2 * probability**settings.network.power)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.door_finder import DoorFinder
+from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.doors.geometry import DOOR
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
@@ -97,7 +98,9 @@ class DoorPipeline:
         self.estimate_all(view)
         self.estimate_all(replace(view, intensity=grey))
 
-    def estimate_all(self, view: DepthView, max_objects: int | None = None) -> list[ObjectEstimate]:
+    def estimate_all(
+        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+    ) -> list[ObjectEstimate]:
         """Estimate the door that the frame shows best; where there is none, tell why."""
         pose = self._known_pose(view)
         view = view.placed(np.eye(4) if pose is None else pose, self.settings.scene.intrinsics)
@@ -124,9 +127,12 @@ class DoorPipeline:
                 ]
             frame = frame._replace(up=pose[2, :3].copy(), height=float(pose[2, 3]))
         found = self.finder.find(frame)
+        if past is not None:
+            found = past.add(found, frame, pose)
         if found.status is DoorStatus.NO_DOOR:
             return [self._none(view, found.reason, _sensor_error(found, self.finder.settings))]
-        camera = replace(camera, pose=found.camera_pose if pose is None else pose)
+        found = found if pose is None else found.in_world(pose)
+        camera = replace(camera, pose=found.camera_pose)
         return [self._placed(found, replace(view, camera=camera), camera)]
 
     def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
@@ -175,8 +181,8 @@ class DoorPipeline:
         return STATUSES[found.status], found.reason
 
     def _placed(self, found: DoorEstimate, view: DepthView, camera: Camera) -> ObjectEstimate:
-        """Return a door that was found, in the world of the camera's pose."""
-        values, covariance = _move(found, camera.pose)
+        """Return a door that was found, in the world of its camera's pose."""
+        values, covariance = found.values[:7], found.covariance[:7, :7]
         theta, gamma = self.model.split(values)
         side = found.handle_side or "right"
         opening = found.value(OPENING)
@@ -222,24 +228,6 @@ def _calibrated(finder: DoorFinder, settings: PipelineSettings) -> DoorFinder:
 
 def _value(quantities: tuple[Quantity, ...], name: str) -> float:
     return next((quantity.value for quantity in quantities if quantity.name == name), 0.0)
-
-
-def _move(
-    found: DoorEstimate, pose: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return theta and gamma (7,) and their covariance in the world of the camera's pose (4, 4).
-
-    Both worlds have their floor at z = 0 and z up: they differ by a turn about z and a shift.
-    """
-    to_world = pose @ np.linalg.inv(found.camera_pose)
-    heading = np.arctan2(to_world[1, 0], to_world[0, 0])
-    c, s = np.cos(heading), np.sin(heading)
-    turn = np.eye(7)
-    turn[:2, :2] = [[c, -s], [s, c]]
-    values = turn @ found.values[:7]
-    values[:2] += pose[:2, 3] - turn[:2, :2] @ found.camera_pose[:2, 3]
-    values[2] = (values[2] + heading + np.pi) % (2.0 * np.pi) - np.pi
-    return values, turn @ found.covariance[:7, :7] @ turn.T
 
 
 def _panel_pixels(

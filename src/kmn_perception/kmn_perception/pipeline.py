@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -95,7 +96,9 @@ class MorphPipeline:
         """Estimate the morphing parameters of the nearest object of a frame."""
         return self.estimate_all(view, 1)[0].estimate
 
-    def estimate_all(self, view: DepthView, max_objects: int | None = None) -> list[ObjectEstimate]:
+    def estimate_all(
+        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+    ) -> list[ObjectEstimate]:
         """Estimate the morphing parameters of ``max_objects`` or all objects, the nearest first.
 
         Returns

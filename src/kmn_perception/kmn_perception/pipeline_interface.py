@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.estimator import Estimate, EstimatorSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
@@ -89,8 +90,16 @@ class Pipeline(Protocol):
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
 
-    def estimate_all(self, view: DepthView, max_objects: int | None = None) -> list[ObjectEstimate]:
-        """Estimate ``max_objects`` or all objects; where there is none, a single one says why."""
+    def estimate_all(
+        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+    ) -> list[ObjectEstimate]:
+        """Estimate ``max_objects`` or all objects; where there is none, a single one says why.
+
+        Parameters
+        ----------
+        past
+            The frames before, with which doors in walls are fused; None: the frame by itself.
+        """
 
     def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
         """Return the bodies (B, 4, 4) to draw, none without an estimate; see `unit_cubes`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -77,6 +77,24 @@ class DoorEstimate:
             disparity_offset=(np.nan, np.nan),
             score=-np.inf,
         )
+
+    def in_world(self, pose: NDArray[np.float64]) -> DoorEstimate:
+        """Return the same door in the world in which the camera has a pose (4, 4).
+
+        Both worlds have their floor at z = 0 and z up: they differ by a turn about z and a shift.
+        """
+        if not np.isfinite(self.values).all():
+            return replace(self, camera_pose=pose)
+        to_world = pose @ np.linalg.inv(self.camera_pose)
+        heading = np.arctan2(to_world[1, 0], to_world[0, 0])
+        c, s = np.cos(heading), np.sin(heading)
+        turn = np.eye(len(DOOR))
+        turn[:2, :2] = [[c, -s], [s, c]]
+        values = turn @ self.values
+        values[:2] += pose[:2, 3] - turn[:2, :2] @ self.camera_pose[:2, 3]
+        values[2] = (values[2] + heading + np.pi) % (2.0 * np.pi) - np.pi
+        covariance = turn @ self.covariance @ turn.T
+        return replace(self, values=values, covariance=covariance, camera_pose=pose)
 
     @property
     def found(self) -> bool:

@@ -14,7 +14,7 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
-from kmn_perception.doors.part_settings import HandleSettings, LintelSettings
+from kmn_perception.doors.part_settings import FusionSettings, HandleSettings, LintelSettings
 from kmn_perception.doors.search_settings import (
     FloorSettings,
     LineSettings,
@@ -192,6 +192,7 @@ class DoorSettings:
     network: NetworkSettings
     reveal: RevealSettings
     prior: PriorSettings
+    fusion: FusionSettings
     candidates: Count
     calibration: Calibration
     delivered: Calibration

@@ -28,11 +28,14 @@ class Images(NamedTuple):
         (height, width) with blur, noise and gamma.
     bodies
         (height, width) index of the cuboid that is seen; -1 where there is none.
+    light
+        (height, width) that reaches the camera: what `expose` makes another grey image of.
     """
 
     depth: NDArray[np.float32]
     grey: NDArray[np.uint8]
     bodies: NDArray[np.int16]
+    light: NDArray[np.float32]
 
 
 def render_room(room: Room, settings: ImageSettings, generator: np.random.Generator) -> Images:
@@ -46,10 +49,10 @@ def render_room(room: Room, settings: ImageSettings, generator: np.random.Genera
     cubes = np.array([body.cube for body in room.cuboids])
     depth, bodies = render_bodies(cubes, room.camera)
     light = _radiance(room, cubes, bodies, settings, generator)
-    grey = _expose(light, settings, generator)
+    grey = expose(light, settings, generator)
     lost = [k for k, body in enumerate(room.cuboids) if body.name in room.glass]
     depth[np.isin(bodies, lost)] = np.nan
-    return Images(depth, grey, bodies)
+    return Images(depth, grey, bodies, light)
 
 
 def _radiance(
@@ -114,7 +117,7 @@ def _shadow_map(
     return np.nan_to_num(depth, nan=np.inf), camera.projection @ room.wall
 
 
-def _expose(
+def expose(
     light: NDArray[np.float32], settings: ImageSettings, generator: np.random.Generator
 ) -> NDArray[np.uint8]:
     """Return the image (height, width) of the light: exposure, blur, noise and gamma."""

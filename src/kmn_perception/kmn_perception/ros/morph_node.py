@@ -20,6 +20,7 @@ from visualization_msgs.msg import MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
+from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.estimator import Estimate, Status
 from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
 from kmn_perception.ros.frame_receiver import Frame, FrameReceiver, read_cloud
@@ -45,6 +46,7 @@ from kmn_perception.scene.sensor_diagnosis import DiagnosisSettings
 from kmn_perception.scene.tracking import ObjectTracker
 
 QUEUE_DEPTH = 10  # of the publishers
+POSE = {"camera_position", "camera_quaternion"}  # parameters that change as the camera moves
 
 
 class DetectedObject(NamedTuple):
@@ -83,6 +85,13 @@ class Active(NamedTuple):
 
     settings: MorphNodeSettings
     pipeline: Pipeline
+    past: FrameFusion | None
+
+    @classmethod
+    def begin(cls, settings: MorphNodeSettings, pipeline: Pipeline) -> Active:
+        """Begin with no frame in the past."""
+        number = settings.fused_frames
+        return cls(settings, pipeline, FrameFusion(number) if number > 1 else None)
 
 
 class MorphNode(Node):
@@ -101,7 +110,7 @@ class MorphNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("morph_node", **options)
         settings = MorphNodeSettings.check(declare_parameters(self, "morph_node"))
-        self._active = Active(settings, load_pipeline(settings))
+        self._active = Active.begin(settings, load_pipeline(settings))
         self._statistics = FrameStatistics()
         scene = settings.pipeline.scene
         self._sensor = SensorWatch(REPORT_PERIOD, DiagnosisSettings.load(), scene.intrinsics)
@@ -140,7 +149,7 @@ class MorphNode(Node):
 
     def _listen_to_images(self) -> None:
         """Subscribe to images only where they are used: they are large."""
-        settings, pipeline = self._active
+        settings, pipeline, _ = self._active
         self._images.listen(settings.use_image and pipeline.uses_image)
 
     def _on_estimate(
@@ -149,7 +158,7 @@ class MorphNode(Node):
         read = partial(read_cloud, request.points)
         self._statistics.receive(replaced=False)
         frame = Frame(request.points.header, read, time.monotonic())
-        answer = self._answer(frame, all_objects=False, wait_for_image=False)
+        answer = self._answer(frame, all_objects=False, is_single=True)
         response.parameters = answer.parameters()[0]
         return response
 
@@ -162,11 +171,12 @@ class MorphNode(Node):
                     self._parameters_publisher.publish(parameters)
                 self._model_publisher.publish(answer.markers())
 
-    def _answer(
-        self, frame: Frame, all_objects: bool, wait_for_image: bool = True
-    ) -> FrameEstimates:
-        """Estimate a frame; whatever is wrong with it becomes the reason of the answer."""
-        settings, pipeline = self._active
+    def _answer(self, frame: Frame, all_objects: bool, is_single: bool = False) -> FrameEstimates:
+        """Estimate a frame; whatever is wrong with it becomes the reason of the answer.
+
+        A single one waits for no image, and has no past.
+        """
+        settings, pipeline, past = self._active
         header = Header(stamp=frame.header.stamp, frame_id=settings.world_frame)
         try:
             view = frame.read(settings)
@@ -174,9 +184,10 @@ class MorphNode(Node):
                 for mistake in self._sensor.look(view, self._frames.camera_info):
                     self._warnings.warn(mistake.key, mistake.text)
             waited = time.monotonic() - frame.received
-            patience = settings.image_delay - waited if wait_for_image else 0.0
+            patience = 0.0 if is_single else settings.image_delay - waited
             view, lack = self._images.add_to(view, settings, patience)
-            objects = pipeline.estimate_all(view, None if all_objects else 1)
+            number = None if all_objects else 1
+            objects = pipeline.estimate_all(view, number, None if is_single else past)
             objects = [_with_lack(found, lack) for found in objects]
             self._sensor.keep_error(objects[0].estimate.sensor_error)
         except MessageError as error:
@@ -227,14 +238,17 @@ class MorphNode(Node):
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
-        before, pipeline = self._active
+        before, pipeline, past = self._active
         try:
             settings = MorphNodeSettings.check(read_parameters(self, "morph_node", parameters))
             if (settings.model, settings.weights) != (before.model, before.weights):
                 pipeline = load_pipeline(settings)
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
-        self._active = Active(settings, pipeline.configured(settings.pipeline, settings.estimator))
+        pipeline = pipeline.configured(settings.pipeline, settings.estimator)
+        self._active = Active.begin(settings, pipeline)
+        if {parameter.name for parameter in parameters} <= POSE:
+            self._active = Active(settings, pipeline, past)
         self._listen_to_images()
         return SetParametersResult(successful=True)
 

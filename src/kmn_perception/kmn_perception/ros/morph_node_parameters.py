@@ -44,6 +44,8 @@ class MorphNodeSettings:
         Use the images beside the depth, where the model is found by them too.
     image_delay
         By which an image's stamp may differ from that of the depth, seconds.
+    fused_frames
+        How many frames of a door are fused at most; 1: each frame is estimated by itself.
     estimator, pipeline
         Settings of the two.
     """
@@ -58,6 +60,7 @@ class MorphNodeSettings:
     rectify: bool
     use_image: bool
     image_delay: float
+    fused_frames: int
     estimator: EstimatorSettings
     pipeline: PipelineSettings
 
@@ -87,6 +90,7 @@ class MorphNodeSettings:
             rectify=values["rectify"],
             use_image=values["use_image"],
             image_delay=values["image_delay"],
+            fused_frames=values["fused_frames"],
             estimator=pick(EstimatorSettings, values),
             pipeline=PipelineSettings(
                 camera_pose=CameraPose(values["camera_pose"]),

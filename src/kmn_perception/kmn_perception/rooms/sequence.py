@@ -1,0 +1,55 @@
+"""Frames of one room that follow each other, seen by a camera that rests or moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from kmn_perception.model.camera import Camera
+from kmn_perception.model.depth_sensor import DepthSensor
+from kmn_perception.model.noisy_sensor import NoisySensor
+from kmn_perception.rooms.frame import Frame
+from kmn_perception.rooms.rendering import Images, expose, render_room
+from kmn_perception.rooms.room import Room
+from kmn_perception.rooms.sampling import sample_room
+from kmn_perception.rooms.settings import ImageSettings, RoomSettings
+
+
+def make_sequence(
+    seed: int, count: int, step: float = 0.0, sensor: str = "d455", kind: str = "door"
+) -> Iterator[Frame]:
+    """Yield frames of the room of a seed, whose noise is fresh in each.
+
+    The calibration of the sensor and the exposure stay, as they do in a camera.
+
+    Parameters
+    ----------
+    step
+        Metres to the right that the camera moves from frame to frame; 0: it rests.
+    sensor
+        Name in ``config/sensors`` and ``config/cameras``.
+    """
+    settings, description = RoomSettings.load(), DepthSensor.load(sensor)
+    room = sample_room(seed, Camera.load(sensor), settings, kind)
+    drawn = np.random.default_rng([seed, 2])
+    offset = description.calibration.calibrated * float(drawn.standard_normal())
+    bright = float(drawn.uniform(*settings.image.brightness))
+    exposure = settings.image._replace(brightness=(bright, bright), moved=0.0)
+    noisy, noise = NoisySensor(description, (seed, 3), offset), np.random.default_rng([seed, 4])
+    images: Images | None = None
+    for number in range(count):
+        if images is None or step:
+            pose = room.camera.pose.copy()
+            pose[:3, 3] += (step if number else 0.0) * pose[:3, 0]
+            room = replace(room, camera=replace(room.camera, pose=pose))
+            images = _render(room, exposure, seed)
+        grey = expose(images.light, exposure, noise)
+        depth = noisy.measure(images.depth, room.camera.fx)
+        yield Frame(room, images._replace(grey=grey), depth, offset)
+
+
+def _render(room: Room, settings: ImageSettings, seed: int) -> Images:
+    """Return exact depth and light; the texture is that of the seed wherever the camera is."""
+    return render_room(room, settings, np.random.default_rng([seed, 1]))

@@ -11,6 +11,7 @@ EXECUTABLES = {
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
+    "evaluate_fusion": ("kmn_perception.evaluation.doors.evaluate_fusion", ""),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "benchmark": ("kmn_perception.benchmark", ""),

@@ -41,13 +41,24 @@ def make_sequence(
     images: Images | None = None
     for number in range(count):
         if images is None or step:
-            pose = room.camera.pose.copy()
-            pose[:3, 3] += (step if number else 0.0) * pose[:3, 0]
-            room = replace(room, camera=replace(room.camera, pose=pose))
+            room = _seen_beside(room, step if number else 0.0)
             images = _render(room, exposure, seed)
         grey = expose(images.light, exposure, noise)
         depth = noisy.measure(images.depth, room.camera.fx)
         yield Frame(room, images._replace(grey=grey), depth, offset)
+
+
+def _seen_beside(room: Room, step: float) -> Room:
+    """Return a room whose camera is so much farther to the right, metres."""
+    camera, door = room.camera, room.door
+    pose = camera.pose.copy()
+    pose[:3, 3] += step * pose[:3, 0]
+    shift = np.array([-step, 0.0, 0.0])  # of all that is told in the optical frame
+    if door is not None:
+        corners = {name: corner + shift for name, corner in door.corners.items()}
+        handle = None if door.handle_centre is None else door.handle_centre + shift
+        door = replace(door, corners=corners, handle_centre=handle)
+    return replace(room, camera=replace(camera, pose=pose), door=door)
 
 
 def _render(room: Room, settings: ImageSettings, seed: int) -> Images:

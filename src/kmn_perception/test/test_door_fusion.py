@@ -16,6 +16,7 @@ from kmn_perception.doors.part_settings import FusionSettings, ParameterShares
 from kmn_perception.doors.resting import RestingCamera
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
+from kmn_perception.evaluation.doors.evaluate_fusion import main
 from kmn_perception.rooms import frame as rooms
 from kmn_perception.rooms.sequence import make_sequence
 
@@ -230,3 +231,14 @@ def test_fusion_begins_anew_where_the_camera_moves_unless_its_pose_is_known() ->
         fusion.add(door(door_width=0.0), first, pose)
         found = fusion.add(door(door_width=0.01), second, pose)
         assert found.value("door_width") == pytest.approx(expected)
+
+
+def test_the_program_tells_what_is_known_after_one_frame_and_after_more(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--doors", "1", "--frames", "3", "--seed", "5002"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for camera in ("resting", "moving"):
+        start = next(i for i, line in enumerate(lines) if line.startswith(f"{camera} camera"))
+        heads = [line.split("  ")[0] for line in lines[start + 1 : start + 8]]
+        assert heads == ["frames", "each alone", "1", "3", "", "shared by frames", "median"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections import defaultdict
 from collections.abc import Sequence
 from itertools import count
 from typing import NamedTuple
@@ -118,15 +117,18 @@ def _cells(outcomes: Sequence[Outcome], frames: int) -> list[str]:
 
 
 def shares_table(results: Sequence[RoomFrames]) -> str:
-    """Return the share of the stated variances by which frames of a room do not differ."""
-    shares: dict[str, list[NDArray[np.float64]]] = defaultdict(list)
+    """Return the share of the stated variances by which the frames of a room do not differ."""
+    shares: list[NDArray[np.float64]] = []
     for result in results:
         if len(result.estimates) > 1:
             values = np.array([one.values for one in result.estimates])
             stated = np.array([np.diag(one.covariance) for one in result.estimates])
-            shares["shared"].append(1.0 - values.var(axis=0, ddof=1) / stated.mean(axis=0))
-    rows = [["of", *DOOR]]
-    rows += [[name, *(f"{x:.2f}" for x in np.mean(s, axis=0))] for name, s in shares.items()]
+            shares.append(1.0 - values.var(axis=0, ddof=1) / stated.mean(axis=0))
+    if not shares:
+        return ""
+    rows = [["shared by frames", *DOOR]]
+    for name, percent in (("median", 50), ("lower quartile", 25)):
+        rows.append([name, *(f"{x:.2f}" for x in np.percentile(shares, percent, axis=0))])
     return columns(rows)
 
 

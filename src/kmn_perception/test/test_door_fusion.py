@@ -49,11 +49,10 @@ def door(
 
 
 def apart(count: int, deviation: float) -> list[DoorEstimate]:
-    """Return doors whose widths differ with just this standard deviation."""
+    """Return doors whose parameters differ with just this standard deviation."""
     signs = np.where(np.arange(count) % 2, 1.0, -1.0)
     size = deviation * np.sqrt((count - 1) / count)  # as of the mean that they tell themselves
-    all_apart = [dict.fromkeys(DOOR, float(size * sign)) for sign in signs]
-    return [door(**values) for values in all_apart]
+    return [replace(door(), values=np.full(len(DOOR), size * sign)) for sign in signs]
 
 
 def add_all(*frames: DoorEstimate, count: int = 30, **changes: Any) -> DoorEstimate:
@@ -170,7 +169,8 @@ def test_a_door_that_was_opened_is_learnt_anew_and_not_averaged() -> None:
     for _ in range(SETTINGS.confirm - 1):
         assert fusion.add(door(opening=0.3)).status is DoorStatus.AMBIGUOUS
     found = fusion.add(door(opening=0.3))
-    assert (found.status, found.value("opening")) == (DoorStatus.OK, pytest.approx(0.3))
+    assert found.status is DoorStatus.OK
+    assert found.value("opening") == pytest.approx(0.3)
 
 
 def test_a_door_that_opens_slowly_is_never_told_wrongly() -> None:

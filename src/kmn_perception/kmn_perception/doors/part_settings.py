@@ -157,7 +157,7 @@ class FusionSettings(NamedTuple):
     Attributes
     ----------
     shared
-        Share of an error's variance that the frames have in common.
+        Least share of an error's variance that frames have in common: they show if it is more.
     disagree
         Joint standard deviations beyond which two frames show different doors.
     sure

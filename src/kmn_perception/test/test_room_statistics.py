@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.evaluation.doors.errors import DoorErrors
 from kmn_perception.evaluation.doors.label import DoorLabel
 from kmn_perception.evaluation.doors.outcome import Outcome, Verdict, judge
 from kmn_perception.evaluation.doors.room_comparison import RoomSample, Traits
@@ -76,23 +77,28 @@ def test_every_door_is_counted_once() -> None:
 
 
 def _room(
-    seed: int, outcome: Outcome, recess: float, observable: bool = True, milliseconds: float = 50.0
+    seed: int,
+    outcome: Outcome,
+    recess: float,
+    observable: bool = True,
+    milliseconds: float = 50.0,
+    limit: DoorErrors | None = None,
 ) -> RoomSample:
     traits = Traits(recess, distance=1.2, view_angle=20.0, handle="lever", state="closed")
     seconds = {METHOD: 1e-3 * milliseconds}
-    return RoomSample("door", seed, traits, observable, {METHOD: outcome}, seconds)
+    return RoomSample("door", seed, traits, observable, {METHOD: outcome}, seconds, limit)
 
 
 def _negative(kind: str, outcome: Outcome) -> RoomSample:
-    return RoomSample(kind, 0, None, False, {METHOD: outcome}, {METHOD: 1.0})
+    return RoomSample(kind, 0, None, False, {METHOD: outcome}, {METHOD: 1.0}, None)
 
 
 SAMPLES = (
-    _room(11, _outcome(RIGHT), 0.003),
+    _room(11, _outcome(RIGHT), 0.003, limit=_outcome(RIGHT).errors),
     _room(12, _outcome(LIE), 0.02, milliseconds=70.0),
     _room(13, _outcome(UNCERTAIN), 0.02),
     _room(14, _outcome(replace(UNCERTAIN, reason="the edge is known to 9.5 mm")), 0.06),
-    _room(15, _outcome(REFUSED), 0.06),
+    _room(15, _outcome(REFUSED), 0.06, limit=_outcome(IMPRECISE).errors),
     _room(16, _outcome(IMPRECISE), 0.05, observable=False),
     _negative("brick", _outcome(REFUSED, None)),
     _negative("brick", _outcome(RIGHT, None)),
@@ -121,6 +127,8 @@ def test_statistics_of_doors_and_negatives_are_apart() -> None:
         assert sum(part["doors"] for part in trait.values()) == 5
     # Edges are off by 5, 0 and 50 mm, each of both.
     assert method["edge_mm"]["median"] == pytest.approx(5.0)
+    # The limit is that of doors that are found: with the edges told, one of them, off by 5 mm.
+    assert method["limit"]["edge_mm"] == {"median": pytest.approx(5.0), "p95": pytest.approx(5.0)}
     assert method["top_mm"]["p95"] == pytest.approx(np.percentile([0.0, 31.0, 0.0], 95))
     assert method["milliseconds"]["median"] == pytest.approx(50.0)
     negatives = method["negatives"]

@@ -15,7 +15,9 @@ from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
 from kmn_perception.evaluation.comparison import Request
+from kmn_perception.evaluation.doors.errors import DoorErrors
 from kmn_perception.evaluation.doors.label import DoorLabel, describe
+from kmn_perception.evaluation.doors.limit import errors_at_limit
 from kmn_perception.evaluation.doors.outcome import Outcome, judge
 from kmn_perception.evaluation.doors.settings import DoorErrorSettings, RoomEvaluationSettings
 from kmn_perception.evaluation.hashes import short_hash
@@ -70,6 +72,8 @@ class RoomSample(NamedTuple):
         Whether both upright edges of a door are seen.
     outcomes, seconds
         By method; the seconds are those of one core.
+    limit
+        Errors of who is told the edges, see `errors_at_limit`; None where they cannot be measured.
     """
 
     kind: str
@@ -78,6 +82,7 @@ class RoomSample(NamedTuple):
     observable: bool
     outcomes: dict[str, Outcome]
     seconds: dict[str, float]
+    limit: DoorErrors | None
 
 
 class RoomComparison:
@@ -114,7 +119,7 @@ class RoomComparison:
         # The truth is exact: an angle of 0 is 0.
         self._limits = replace(DoorErrorSettings.load(), opening_deviation=0.0)
         wanted, without = request.methods or ROOM_METHODS, DoorFinder(DoorSettings.load())
-        finder = self._with_network() or without
+        self._best = finder = self._with_network() or without
         self._finders = {
             name: without if name == NO_NETWORK else finder
             for name in wanted
@@ -146,7 +151,11 @@ class RoomComparison:
         self._is_warm = True
         observable = truth is not None and truth.edges_in_view
         traits = None if truth is None else _traits(text, truth)
-        return RoomSample(kind, seed, traits, observable, outcomes, seconds)
+        limit = None
+        if truth is not None and observable:
+            seen = Frame(depth, grey, frame.room.camera)
+            limit = errors_at_limit(self._best, seen, truth, self.model, self._limits)
+        return RoomSample(kind, seed, traits, observable, outcomes, seconds, limit)
 
     def _with_network(self) -> DoorFinder | None:
         """Return the finder; None where the shipped network is missing, and was not asked for."""

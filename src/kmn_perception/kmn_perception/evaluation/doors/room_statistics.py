@@ -23,7 +23,10 @@ HANDLES = ("lever", "knob", "bar", "none")
 def statistics(
     samples: Sequence[RoomSample], methods: Sequence[str], settings: RoomEvaluationSettings
 ) -> Statistics:
-    """Return the statistics of all methods; errors are of all doors that are found."""
+    """Return the statistics of all methods; errors are of all doors that are found.
+
+    ``limit`` holds the errors of who is told the edges of the same doors.
+    """
     doors = [sample for sample in samples if sample.traits is not None]
     return {
         "observable": sum(sample.observable for sample in doors),
@@ -39,12 +42,15 @@ def _of_method(
     seen = [sample for sample in doors if sample.observable]
     outcomes = [sample.outcomes[name] for sample in doors]
     off = [outcome.errors for outcome in outcomes if outcome.errors is not None]
+    found = [sample for sample in doors if sample.outcomes[name].errors is not None]
+    limits = [sample.limit for sample in found if sample.limit is not None]
     return {
         "of_observable": counts([sample.outcomes[name] for sample in seen]),
         "of_all": counts(outcomes),
         "wrong": _faults(name, doors),
         "refused": _reasons([sample.outcomes[name] for sample in seen], settings.reasons),
         **{key: error_sizes(off, key) for key in ERRORS},
+        "limit": {key: error_sizes(limits, key) for key in ERRORS},
         "coverage95": coverage(off, settings.confidence),
         "milliseconds": times([sample.seconds[name] for sample in doors]),
         "by": {

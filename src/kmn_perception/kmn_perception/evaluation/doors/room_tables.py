@@ -37,8 +37,8 @@ def room_report(result: dict[str, Any]) -> str:
         title,
         f"Of {seen} doors with both edges in view\n{_counts(methods, 'of_observable')}",
         f"Of all {doors} doors\n{_counts(methods, 'of_all')}",
-        "Errors of the doors that are found: median / 95th percentile, mm and degrees\n"
-        + columns([["method", *HEADS.values(), "in 95 %", "ms"], *map(_errors, methods.items())]),
+        "Errors of the doors that are found: median / 95th percentile, mm and degrees;\n"
+        "limit: of the same doors, if their edges are told\n" + _errors(methods),
         "What is wrong, of all doors that are found\n" + _faults(methods),
         *(f"Refused by {name}, of those in view\n{_reasons(m)}" for name, m in methods.items()),
         *_breakdowns(methods),
@@ -60,10 +60,15 @@ def _share(counts: dict[str, int], key: str) -> str:
     return f"{100 * counts[key] / doors:.1f} %" if doors else NONE
 
 
-def _errors(item: tuple[str, dict[str, Any]]) -> list[str]:
-    name, method = item
-    covered = NONE if method["coverage95"] is None else f"{text(method['coverage95'], 100, 1)} %"
-    return [name, *error_cells(method), covered, pair(method["milliseconds"], 0)]
+def _errors(methods: dict[str, Any]) -> str:
+    rows = [["method", *HEADS.values(), "in 95 %", "ms"]]
+    for name, method in methods.items():
+        covered = (
+            NONE if method["coverage95"] is None else f"{text(method['coverage95'], 100, 1)} %"
+        )
+        rows.append([name, *error_cells(method), covered, pair(method["milliseconds"], 0)])
+        rows.append(["limit", *error_cells(method["limit"]), "", ""])
+    return columns(rows)
 
 
 def _faults(methods: dict[str, Any]) -> str:

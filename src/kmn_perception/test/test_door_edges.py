@@ -33,10 +33,10 @@ def candidate(
     seen
         The network's probability of the right edge, by the same distance; None without a network.
     """
-    s = np.arange(-2.0, 2.0, PIXEL)
+    s, z = (np.arange(*ends, dtype=np.float64) for ends in ((-2.0, 2.0, PIXEL), (2.5, 2.0, -PIXEL)))
     shape = (100, len(s))
     view = WallView(
-        WallFrame(*AXES, DISTANCE, 1.2), s, np.arange(2.5, 2.0, -PIXEL),
+        WallFrame(*AXES, DISTANCE, 1.2), s, z,
         np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.ones(shape, np.bool_), 0 * s,
     )  # fmt: skip
     lines = [

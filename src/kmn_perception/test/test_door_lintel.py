@@ -20,7 +20,8 @@ AXES = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.
 
 def lintel_of(shades: list[tuple[float, float]]) -> Lintel:
     """Return the top of a panel about which rectangles lie: their margins and shades."""
-    s, z = np.arange(-1.0, 1.0, 0.005), np.arange(2.5, -0.05, -0.005)
+    s = np.arange(-1.0, 1.0, 0.005, dtype=np.float64)
+    z = np.arange(2.5, -0.05, -0.005, dtype=np.float64)
     grey = np.zeros((len(z), len(s)), np.float32)
     for margin, shade in sorted(shades, reverse=True):
         inside = (s > LEFT - margin) & (s < RIGHT + margin)

@@ -65,8 +65,8 @@ def _medians(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return median and spread (from the 10th to the 90th percentile) of 1 / z of each block."""
     rows, columns = depth.shape[0] // size, depth.shape[1] // size
-    blocks = depth[: rows * size, : columns * size].reshape(rows, size, columns, size)
-    blocks = blocks.swapaxes(1, 2).reshape(rows, columns, size * size)
+    parts = depth[: rows * size, : columns * size].reshape(rows, size, columns, size)
+    blocks = parts.swapaxes(1, 2).reshape(rows, columns, size * size)
     measured = blocks > 0.0  # neither none nor NaN
     z = np.sort(np.where(measured, blocks, np.float32(np.inf)), axis=2)
     count = measured.sum(axis=2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -176,8 +176,8 @@ def gaussian_steps(
     weights = x * np.exp(-0.5 * (x / smoothing) ** 2)
     weights *= smoothing * np.sqrt(2.0 * np.pi) / (weights * x).sum()
     along, across = weights.astype(np.float32), np.ones(1, np.float32)
-    kernels = (along, across) if axis == 1 else (across, along)
-    steps = cv2.sepFilter2D(grey, -1, *kernels, borderType=cv2.BORDER_REPLICATE)
+    x_kernel, y_kernel = (along, across) if axis == 1 else (across, along)
+    steps = cv2.sepFilter2D(grey, -1, x_kernel, y_kernel, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(steps, dtype=np.float32)
 
 
@@ -226,7 +226,7 @@ def _sums(
     values: NDArray[np.float32] | NDArray[np.bool_], rows: NDArray[np.int64], count: int
 ) -> NDArray[np.float32]:
     """Return sums (count, columns) over the rows of each piece, which lie together."""
-    numbers = values.view(np.uint8) if values.dtype == np.bool_ else values
+    numbers: Any = values.view(np.uint8) if values.dtype == np.bool_ else values
     sums = np.zeros((count, values.shape[1]), np.float32)
     for k in range(count):
         piece = np.flatnonzero(rows == k)

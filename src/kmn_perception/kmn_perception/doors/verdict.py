@@ -47,9 +47,9 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         handle_kind="" if handle is None else handle.kind,
         camera_pose=_camera_pose(frame, 1.0 / found.inverse_height),
         corners=np.array(
-            [place(p, z) for z in (shape.top, 0.0) for p in (shape.left, shape.right)]
+            [place(p, z) for z in (float(shape.top), 0.0) for p in (shape.left, shape.right)]
         ),
-        handle=place(shape.handle, shape.handle_height),
+        handle=place(shape.handle, float(shape.handle_height)),
         normal=-panel[0] * frame.right + panel[1] * frame.normal,
         disparity_offset=(
             float(found.surfaces.values[OFFSET]),

@@ -123,13 +123,13 @@ def resample(
     inside &= (v > 0.0) & (v < camera.height - 1.0)
     seen = cv2.remap(depth, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
     measured = (seen > 0.0) & inside
-    offset = np.full_like(seen, np.nan)
+    offset = np.full(seen.shape, np.nan, np.float32)
     np.divide(1.0, seen, out=offset, where=measured)
     offset -= inverse
     shade: NDArray[np.float32] | None = None
     if grey is not None:
-        shade = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        shade = np.log(np.maximum(shade, 0.0) + np.float32(DARKEST))
+        seen_grey = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shade = np.log(np.maximum(seen_grey, 0.0) + np.float32(DARKEST)).astype(np.float32)
     # Along a level line: the change of direction with s, in pixels.
     footprint = (frame.distance**2 + s**2) / frame.distance / camera.fx
     return WallView(frame, s, z, shade, offset, inside, footprint)
@@ -140,7 +140,8 @@ def _columns_in_view(
 ) -> NDArray[np.float64]:
     """Return the columns (metres) of which something is in the image."""
     s = np.arange(-settings.reach, settings.reach, settings.pixel, dtype=np.float64)
-    u, v, depth = _scaled_pixels(frame, s, np.linspace(*settings.heights, 13), camera)
+    probes = np.linspace(*settings.heights, 13, dtype=np.float64)
+    u, v, depth = _scaled_pixels(frame, s, probes, camera)
     inside = (depth > camera.near) & (u > 0.0) & (u < (camera.width - 1.0) * depth)
     inside &= (v > 0.0) & (v < (camera.height - 1.0) * depth)
     visible = np.flatnonzero(inside.any(axis=0) & (np.hypot(s, frame.distance) < settings.reach))

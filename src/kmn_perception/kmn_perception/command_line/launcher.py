@@ -14,6 +14,7 @@ from pathlib import Path
 from types import FrameType
 
 MIDDLEWARE = "RMW_IMPLEMENTATION"  # the variable that chooses it
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"  # read when numpy is loaded
 OWN = "kmn_"  # our packages begin with it
 INTERRUPTED = 128 + signal.SIGINT  # exit status, by convention
 
@@ -40,6 +41,8 @@ def launch(package: str, executables: Mapping[str, tuple[str, str]]) -> int:
     if problem := middleware_problem():
         print(f"{name}: {problem}", file=sys.stderr)
         return 1
+    # Matrices are small here: a second thread of BLAS only waits for the first, and burns a core.
+    os.environ.setdefault(BLAS_THREADS, "1")
     signal.signal(signal.SIGINT, _quit)  # an exception could get lost in what is being loaded
     try:
         main = import_module(module).main

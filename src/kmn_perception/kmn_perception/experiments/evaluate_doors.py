@@ -20,6 +20,7 @@ from kmn_perception.experiments.doors.statistics import statistics
 from kmn_perception.experiments.doors.tables import frame_table, in_view, method_table
 from kmn_perception.experiments.labelled_frame import FrameError
 from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.weights import WeightsError
 
 
@@ -59,6 +60,7 @@ def main(command: Sequence[str] | None = None) -> int:
 
 def _report(options: argparse.Namespace) -> None:
     """Evaluate the frames, print the tables, and write what was asked for."""
+    use_one_thread()
     settings = ExperimentSettings.load()
     without_json = describe_camera(options.camera or settings.doors.camera)
     frames = find_frames(options.folder, options.depth, without_json)

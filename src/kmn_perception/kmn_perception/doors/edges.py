@@ -13,9 +13,6 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallView
 
-_UNMARKED = 0.5  # likelihood of an edge of the pair that shows no line
-_UNLIKELY = 0.02  # what a place that the network finds impossible still counts
-
 
 def measure_edge(candidate: Candidate, side: str, settings: DoorSettings) -> tuple[float, float]:
     """Return the direction of an edge and its standard deviation, if it is the door's.
@@ -60,7 +57,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
             abs(place - other) <= settings.reveal.line for other in pair
         ):
             continue
-        probability = _probability(candidate, side, line.column)
+        probability = _probability(candidate, side, line.column, settings)
         weights.append(weight_of(line.contrast, probability, settings))
         offsets.append(offset)
     if not sum(weights):
@@ -111,18 +108,21 @@ def both_seen(
             for other in candidate.lines
         )
 
-    own = _probability(candidate, side, line.column) * (1.0 if is_line(outer) else _UNMARKED)
-    frame = _probability(candidate, side, column(inner)) * (1.0 if is_line(inner) else _UNMARKED)
+    unmarked = settings.reveal.unmarked
+    own = _probability(candidate, side, line.column, settings)
+    own *= 1.0 if is_line(outer) else unmarked
+    frame = _probability(candidate, side, column(inner), settings)
+    frame *= 1.0 if is_line(inner) else unmarked
     share = own / (own + frame)
     return share, max(float(np.sqrt(share * (1.0 - share))), settings.reveal.hidden[1])
 
 
-def _probability(candidate: Candidate, side: str, column: int) -> float:
+def _probability(candidate: Candidate, side: str, column: int, settings: DoorSettings) -> float:
     """Return the network's probability that the door's edge is there; 1 without a network."""
     if candidate.proposals is None:
         return 1.0
     found = candidate.proposals.left if side == "left" else candidate.proposals.right
-    return near(found, round(cell_of(candidate.view, column)), 1) + _UNLIKELY
+    return near(found, round(cell_of(candidate.view, column)), 1) + settings.network.unlikely
 
 
 def _subpixel(

@@ -15,7 +15,6 @@ from kmn_perception.model.camera import Camera
 _FLOOR_OF_NOISE = 0.005  # of the logarithm of grey
 _PIXEL = 0.005  # metres
 _JOINED = 3  # pixels of a handle that may look like the panel
-_CONVINCED = np.log(3.0)  # of odds no more is believed: aslant, knobs on stems look like levers
 _REACH = 0.12  # metres to either side of the peak that a handle may reach
 
 
@@ -221,7 +220,8 @@ def _kind(seen: _Span, hint: Hint | None, settings: HandleSettings) -> tuple[str
     excess = np.array([seen.excess(kind, settings) for kind in ("knob", "lever")])
     evidence = float(np.diff(-(excess**2))[0]) / (2.0 * settings.length_deviation**2)
     if hint is not None:
-        evidence += float(np.clip(np.log(hint.lever_odds), -_CONVINCED, _CONVINCED))
+        most = np.log(settings.max_odds)
+        evidence += float(np.clip(np.log(hint.lever_odds), -most, most))
     kinds = ("lever", "knob") if evidence > 0.0 else ("knob", "lever")
     at, other = (seen.middle(kind, settings) for kind in kinds)
     doubt = 1.0 / (1.0 + np.exp(abs(evidence)))

@@ -15,7 +15,6 @@ from kmn_perception.doors.view_cells import cell_of, row_of
 from kmn_perception.doors.wall_view import WallView
 
 _PIECE = 0.1  # metres
-_UNLIKELY = 0.02  # what a height that the network finds impossible still counts
 _SMOOTHING = 2.0  # pixels of the view
 
 
@@ -66,7 +65,7 @@ def find_lintel(
     passing = _passing(view, steps, (left, right), contrast, settings.beside)
     evidence = evidence * (1.0 - settings.passing * passing)
     if likely is not None:
-        evidence = evidence * (likely[:-1] + _UNLIKELY)
+        evidence = evidence * (likely[:-1] + settings.unlikely)
     rows = evidence.astype(np.float32)
     peaks = np.flatnonzero((rows > 0.0) & (rows >= largest_near(rows)))
     if seen_to < low or not len(peaks):

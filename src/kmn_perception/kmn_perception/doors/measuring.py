@@ -198,12 +198,12 @@ def _gather(
         outward = direction < 0.0 if i == 0 else direction > 0.0
         side = ("left", "right")[i]
         told, pair = _whose(depth, outward, surfaces, settings.reveal), None
-        if told is settings.reveal.visible and candidate.view.grey is not None:
+        if told is None and candidate.view.grey is not None:
             pair = reveal_pair(candidate, side, depth)
             told = both_seen(candidate, side, pair, settings)
         spread = rivals(candidate, side, pair or (), settings) / at.distance
         deviations[5 + i] = np.hypot(deviation, spread)
-        values[7 + i], deviations[7 + i] = told
+        values[7 + i], deviations[7 + i] = told or settings.reveal.visible
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
     if handle is None:
@@ -248,8 +248,10 @@ def _gather(
 
 def _whose(
     depth: float, outward: bool, surfaces: Surfaces, settings: RevealSettings
-) -> tuple[float, float]:
+) -> tuple[float, float] | None:
     """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
+
+    None where both are in sight.
 
     Parameters
     ----------
@@ -262,7 +264,7 @@ def _whose(
         return settings.own if outward or depth < 0.0 else settings.unknown
     if depth < 0.0:
         return settings.proud
-    return settings.visible if outward else settings.hidden
+    return None if outward else settings.hidden
 
 
 def _usual_top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:

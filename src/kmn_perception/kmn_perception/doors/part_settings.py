@@ -58,6 +58,8 @@ class HandleSettings:
         Standard deviation of a handle's length, metres.
     extent
         It reaches as far as this part of its largest contrast.
+    max_odds
+        Of the network's for a lever against a knob: aslant, a knob on a stem looks like a lever.
     """
 
     heights: Interval
@@ -80,6 +82,7 @@ class HandleSettings:
     knob: Positive
     length_deviation: Positive
     extent: Fraction
+    max_odds: Positive
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,8 @@ class LintelSettings:
         Standard deviation of its height, metres.
     sure, hint_noise
         Probability from which on the network alone tells it, and its deviation then, metres.
+    unlikely
+        What a height that the network finds impossible still counts.
     beside
         Distances from the upright edges between which a frame's top goes on, metres.
     passing
@@ -111,6 +116,7 @@ class LintelSettings:
     noise: Positive
     sure: Fraction
     hint_noise: Positive
+    unlikely: Fraction
     beside: Interval
     passing: Fraction
 

@@ -16,7 +16,6 @@ from kmn_perception.doors.wall_view import WallView
 from kmn_perception.network.wall_network import KINDS, Proposals, WallNetwork, propose
 
 _LEAST = 1e-6  # probability of what a network finds impossible
-_STEP_CLARITY = 0.05  # what a standard deviation of a step in depth is worth as contrast
 _BESIDE = 6  # cells beside an edge where what stands out may be seen
 
 
@@ -134,7 +133,8 @@ def _edge(
     near_by = [line for line in lines if abs(line.column - column) <= reach]
 
     def weight(line: Line) -> float:
-        clarity = max(line.contrast + _STEP_CLARITY * abs(line.step), settings.lines.min_contrast)
+        clarity = line.contrast + settings.network.step * abs(line.step)
+        clarity = max(clarity, settings.lines.min_contrast)
         probability = near(probabilities, round(cell_of(view, line.column)), 1)
         return weight_of(clarity, probability, settings)
 

@@ -197,9 +197,15 @@ class NetworkSettings(NamedTuple):
         Distance within which an edge of the view is the one that is meant, metres.
     power
         Of its probability by which lines that may be the same edge are weighed.
+    unlikely
+        What a place that it finds impossible still counts.
+    step
+        What a standard deviation of a step in depth is worth as a step of the logarithm of grey.
     """
 
     peaks: Count
     min_confidence: Fraction
     snap: Positive
     power: Positive
+    unlikely: Fraction
+    step: Positive

@@ -149,6 +149,8 @@ class RevealSettings(NamedTuple):
         hides the panel's.
     line
         Metres within which a line is one of the two edges.
+    unmarked
+        Likelihood that such an edge shows no line.
     proud
         Of a panel that stands out of the wall.
     swung
@@ -160,6 +162,7 @@ class RevealSettings(NamedTuple):
     visible: tuple[float, float]
     hidden: tuple[float, float]
     line: Positive
+    unmarked: Fraction
     proud: tuple[float, float]
     swung: Positive
     own: tuple[float, float]

@@ -249,6 +249,16 @@ def quarter_turn(frame: Frame) -> Frame:
     )
 
 
+@pytest.mark.parametrize("short", [1e-9, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_a_wall_of_which_only_a_strip_is_near_enough_has_a_reason(short: float) -> None:
+    """At the end of the reach a wall's view is a few columns wide, or none."""
+    distance = finder().settings.view.reach - short
+    depth = np.full((480, 640), distance, np.float32)
+    found = finder().find(Frame(depth, np.full((480, 640), 0.5, np.float32), CAMERA))
+    assert not found.found
+    assert found.reason
+
+
 def test_an_empty_frame_and_a_frame_without_walls_have_a_reason() -> None:
     nothing = Frame(np.zeros((480, 640), np.float32), None, CAMERA)
     assert finder().find(nothing).reason == "no plane is seen"

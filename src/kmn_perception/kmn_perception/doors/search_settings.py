@@ -107,6 +107,8 @@ class WallViewSettings:
         Distance along the wall up to which it is looked at, metres.
     heights
         Above the floor, metres.
+    min_width
+        Of the view, metres; a narrower one does not show both edges of any door.
     before, behind
         Offsets of the inverse depth, in pixel noises, from which something stands before the wall,
         and from which nothing of a door is there.
@@ -115,6 +117,7 @@ class WallViewSettings:
     pixel: Positive
     reach: Positive
     heights: Interval
+    min_width: Positive
     before: Positive
     behind: Positive
 

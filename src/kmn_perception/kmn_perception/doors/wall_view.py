@@ -100,7 +100,7 @@ def view_wall(
         (height, width) metres, 0 for none; and 0 to 1.
     """
     s = _columns_in_view(frame, camera, settings)
-    if len(s) < 2:
+    if len(s) * settings.pixel < settings.min_width:
         return None
     low, high = settings.heights
     z = np.arange(high, low, -settings.pixel, dtype=np.float64)

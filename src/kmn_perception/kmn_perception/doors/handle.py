@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.doors.handle_kind import Span, kind_of
 from kmn_perception.doors.part_settings import HandleSettings
 from kmn_perception.doors.wall_view import WallFrame, WallView, resample
 from kmn_perception.model.camera import Camera
@@ -150,14 +151,16 @@ def _in_grey(
         return _as_hinted(hint, edges, settings)
     masked = np.where(windows[side], answer, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
-    first, last = _extent(view.grey, int(row), int(column), noise, settings)
+    panel = (view.s > edges[0]) & (view.s < edges[1])
+    first, last = _extent(view.grey, (int(row), int(column)), panel, noise, settings)
     rows = slice(max(row - 4, 0), row + 5)
     weights = np.maximum(answer[rows, first : last + 1].mean(axis=1) - 0.25 * peaks[side], 0.0)
     z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
     shift = shifts[edges[0] if side == "left" else edges[1]]
     outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
-    seen = _Span(float(view.s[first]), float(view.s[last]), shift, outward)
-    kind, at, along = _kind(seen, hint if trust is settings.confirmed else None, settings)
+    span = Span(float(view.s[first]), float(view.s[last]), shift, outward)
+    odds = hint.lever_odds if hint is not None and trust is settings.confirmed else 1.0
+    kind, at, along = kind_of(span, odds, settings)
     return Handle(side, kind, at, z, ratio, other, along, settings.up_noise)
 
 
@@ -174,61 +177,6 @@ def _as_hinted(
     return Handle(side, hint.kind, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
 
 
-class _Span(NamedTuple):
-    """What a handle spans on its panel.
-
-    What stands out is seen shifted against its foot, and the neck between them joins the two. A
-    lever points inward: it hides its neck where the shift is outward, and prolongs it elsewhere.
-
-    Attributes
-    ----------
-    first, last
-        Along the panel, metres.
-    shift
-        Of a handle's middle against the point of the panel behind it, metres to the right.
-    outward
-        Whether that is towards the panel's nearer edge.
-    """
-
-    first: float
-    last: float
-    shift: float
-    outward: bool
-
-    def excess(self, kind: str, settings: HandleSettings) -> float:
-        """Return by how much it is longer than a kind of handle, metres."""
-        if kind == "knob":
-            expected = settings.knob + abs(self.shift)
-        else:
-            expected = settings.lever + (0.0 if self.outward else abs(self.shift))
-        return self.last - self.first - expected
-
-    def middle(self, kind: str, settings: HandleSettings) -> float:
-        """Return where the middle of a kind of handle is seen, metres along the panel."""
-        length = self.last - self.first
-        if kind == "knob" or not self.outward:
-            length = max(length - abs(self.shift), settings.knob)
-        return self.last - 0.5 * length if self.shift > 0.0 else self.first + 0.5 * length
-
-
-def _kind(seen: _Span, hint: Hint | None, settings: HandleSettings) -> tuple[str, float, float]:
-    """Return what is seen, where its middle is, and the deviation of that, metres.
-
-    Length and network speak for a lever or a knob; where neither is sure, the middle may be that
-    of the other kind.
-    """
-    excess = np.array([seen.excess(kind, settings) for kind in ("knob", "lever")])
-    evidence = float(np.diff(-(excess**2))[0]) / (2.0 * settings.length_deviation**2)
-    if hint is not None:
-        most = np.log(settings.max_odds)
-        evidence += float(np.clip(np.log(hint.lever_odds), -most, most))
-    kinds = ("lever", "knob") if evidence > 0.0 else ("knob", "lever")
-    at, other = (seen.middle(kind, settings) for kind in kinds)
-    doubt = 1.0 / (1.0 + np.exp(abs(evidence)))
-    apart = np.sqrt(doubt * (1.0 - doubt)) * (other - at)
-    return kinds[0], at, float(np.hypot(settings.along_noise, apart))
-
-
 def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> NDArray[np.float32]:
     """Return by how much a level bar about each pixel differs from what is above and below it.
 
@@ -243,12 +191,18 @@ def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> 
 
 
 def _extent(
-    grey: NDArray[np.float32], row: int, column: int, noise: float, settings: HandleSettings
+    grey: NDArray[np.float32],
+    peak: tuple[int, int],
+    panel: NDArray[np.bool_],
+    noise: float,
+    settings: HandleSettings,
 ) -> tuple[int, int]:
-    """Return first and last column of what differs from the panel above it, as the peak does.
+    """Return first and last column of what differs from what is above it, as the peak does.
 
-    Above, not below: there may be its shadow, a rosette or a keyhole.
+    Above, not below: there may be its shadow, a rosette or a keyhole. How clear it is on the
+    ``panel`` (columns,) counts, not before the reveal beside it.
     """
+    row, column = peak
     gap = round(settings.bar[2] / _PIXEL)
     lean = round(0.5 * settings.bar[1] / _PIXEL)
     thin = cv2.blur(grey, (3, 3), borderType=cv2.BORDER_REPLICATE)
@@ -258,7 +212,8 @@ def _extent(
     contrast = (sign * band).max(axis=0)
     reach = round(_REACH / _PIXEL)
     window = slice(max(column - reach, 0), column + reach + 1)
-    on_it = contrast > max(settings.extent * float(contrast[window].max()), 4.0 * noise)
+    clear = float(np.where(panel, contrast, 0.0)[window].max())
+    on_it = contrast > max(settings.extent * clear, 4.0 * noise)
     ends = [column, column]
     for k, step in enumerate((-1, 1)):
         misses, i = 0, column

@@ -39,12 +39,12 @@ def watch(clock: SteadyClock) -> StateWatch:
 
 def reason(watch: StateWatch, now: float) -> str:
     with pytest.raises(StatesError) as raised:
-        watch.newest(now)
+        watch.newest(now, watch.breaks)
     return raised.value.reason
 
 
 def test_the_newest_state_is_that_of_robot_and_door(watch: StateWatch) -> None:
-    state = watch.newest(10.1)
+    state = watch.newest(10.1, watch.breaks)
     assert (state.time, *state.robot, state.hinge, state.handle) == (10.0, 1.0, 2.0, -0.1, -0.2)
 
 
@@ -101,4 +101,17 @@ def test_waiting_ends_with_the_next_state(watch: StateWatch) -> None:
     before = time.monotonic()
     watch.wait(60.0)
     assert time.monotonic() - before < 30.0
-    assert watch.newest(10.1).time == 10.1
+    assert watch.newest(10.1, watch.breaks).time == 10.1
+
+
+def test_the_first_state_of_another_world_is_not_given_as_one_of_this(watch: StateWatch) -> None:
+    """However late the jump comes, even while the caller asks for the time."""
+    known = watch.breaks
+
+    def now() -> float:
+        watch.put("joint_states", Sample(10.1, np.array([3.0, 2.0])))
+        return 10.1
+
+    with pytest.raises(StatesError, match="base_x jumped by 2.00") as raised:
+        watch.newest(now(), known)
+    assert raised.value.reason == "another_world"

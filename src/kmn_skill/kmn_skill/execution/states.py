@@ -106,21 +106,25 @@ class StateWatch:
             self._newest[topic], self._received[topic] = sample, self._steady()
             self._changed.notify_all()
 
-    def newest(self, now: float) -> WorldState:
+    def newest(self, now: float, breaks: int) -> WorldState:
         """Return the newest state.
 
         Parameters
         ----------
         now
             Present time on the clock of the states, seconds.
+        breaks
+            How many there were when the caller came to know the world.
 
         Raises
         ------
         StatesError
-            If it is too old, by its time or by when it came.
+            If it is of another world, or too old, by its time or by when it came.
         """
         timeout = self.settings.state_timeout
-        with self._changed:
+        with self._changed:  # a state must not come between the two questions
+            if self.breaks != breaks:
+                raise StatesError("another_world", self.last_break)
             for topic in self._names:
                 if topic not in self._newest:
                     raise StatesError("no_states", f"no {topic} came yet")

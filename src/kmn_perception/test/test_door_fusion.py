@@ -11,8 +11,8 @@ import pytest
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.doors.fusion import DoorFusion, agree, fuse
+from kmn_perception.doors.fusion_settings import FusionSettings, ParameterShares
 from kmn_perception.doors.geometry import DOOR
-from kmn_perception.doors.part_settings import FusionSettings, ParameterShares
 from kmn_perception.doors.resting import RestingCamera
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
@@ -120,6 +120,13 @@ def test_a_handle_seen_in_one_frame_is_seen() -> None:
     assert (found.status, found.handle_side, found.handle_kind) == (DoorStatus.OK, "right", "lever")
     assert found.value("handle_z") == 0.02
     assert found.deviation("handle_z") == pytest.approx(DEVIATION)
+
+
+def test_a_handle_that_one_of_many_frames_shows_is_not_seen() -> None:
+    """The more frames, the likelier one of them takes something else for a handle."""
+    found = add_all(*[UNSEEN] * 5, door(), *[UNSEEN] * 4)
+    assert found.status is DoorStatus.HANDLE_NOT_SEEN
+    assert not found.handle_side
 
 
 def test_an_open_door_without_a_handle_in_sight_may_be_hinged_on_either_side() -> None:

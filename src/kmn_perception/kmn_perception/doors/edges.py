@@ -43,7 +43,7 @@ def rivals(candidate: Candidate, side: str, pair: Sequence[float], settings: Doo
     Parameters
     ----------
     pair
-        Where the other edge of the same reveal is seen, see `both_seen`; that is no rival.
+        Where the other edge of the same reveal is seen, see `reveal_pair`; that is no rival.
     """
     chosen, view = candidate.edge(side), candidate.view
     pixel = float(view.s[1] - view.s[0])

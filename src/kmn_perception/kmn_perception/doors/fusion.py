@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.fusion_settings import FusionSettings
 from kmn_perception.doors.geometry import DOOR, WIDTH
-from kmn_perception.doors.part_settings import FusionSettings
 
 _X, _Y, _YAW, _OPENING, _RECESS = (
     DOOR.index(name) for name in ("x", "y", "yaw", "opening", "recess")
@@ -135,11 +135,13 @@ def agree(a: DoorEstimate, b: DoorEstimate, deviations: float) -> bool:
 
 
 def fuse(estimates: Sequence[DoorEstimate], settings: FusionSettings) -> DoorEstimate:
-    """Return the mean of estimates that agree; where a frame saw the handle, of those that did.
+    """Return the mean of estimates that agree; where enough saw the handle, of those that did.
 
     Points in the optical frame, and what else does not enter the mean, are those of the newest.
     """
-    used = [one for one in estimates if one.handle_side] or list(estimates)
+    seen = [one for one in estimates if one.handle_side]
+    is_seen = len(seen) >= max(settings.handle * len(estimates), 1.0)
+    used = seen if is_seen else [one for one in estimates if not one.handle_side]
     newest, n = used[-1], len(used)
     values = np.array([one.values for one in used])
     values[:, _YAW] = newest.values[_YAW] + _wrap(values[:, _YAW] - newest.values[_YAW])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from kmn_perception.configuration.settings import Count, Fraction, Interval, Positive
+from kmn_perception.configuration.settings import Fraction, Interval, Positive
 
 
 class TrustSettings(NamedTuple):
@@ -119,63 +119,3 @@ class LintelSettings:
     unlikely: Fraction
     beside: Interval
     passing: Fraction
-
-
-class ParameterShares(NamedTuple):
-    """A share for each parameter of a door, in the order of `DOOR`."""
-
-    x: Fraction
-    y: Fraction
-    yaw: Fraction
-    door_height: Fraction
-    door_width: Fraction
-    handle_y: Fraction
-    handle_z: Fraction
-    opening: Fraction
-    recess: Fraction
-
-
-class RestSettings(NamedTuple):
-    """When a camera rests between two frames.
-
-    Attributes
-    ----------
-    blur
-        Before grey values are compared, pixels.
-    slope, pixels
-        A line's change of grey per pixel, of 1, and how many pixels of lines are needed.
-    shift
-        Median shift of lines at which it rests still, pixels.
-    inverse_depth
-        And the median change of inverse depths, 1/m.
-    """
-
-    blur: Positive
-    slope: Positive
-    pixels: Count
-    shift: Positive
-    inverse_depth: Positive
-
-
-class FusionSettings(NamedTuple):
-    """How estimates of several frames become one, and when a camera rests between them.
-
-    Attributes
-    ----------
-    shared
-        Least share of an error's variance that frames have in common: they show if it is more.
-    disagree
-        Joint standard deviations beyond which two frames show different doors.
-    sure
-        Share of the frames that must show the door.
-    confirm
-        Frames in a row that replace what was known before.
-    resting
-        When the frames of a camera whose pose is not known are fused.
-    """
-
-    shared: ParameterShares
-    disagree: Positive
-    sure: Fraction
-    confirm: Count
-    resting: RestSettings

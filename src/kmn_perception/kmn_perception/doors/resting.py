@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.part_settings import RestSettings
+from kmn_perception.doors.fusion_settings import RestSettings
 from kmn_perception.doors.walls import Frame
 
 _DARK = 1e-3  # of 1

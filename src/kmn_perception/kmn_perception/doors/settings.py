@@ -14,7 +14,8 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
-from kmn_perception.doors.part_settings import FusionSettings, HandleSettings, LintelSettings
+from kmn_perception.doors.fusion_settings import FusionSettings
+from kmn_perception.doors.part_settings import HandleSettings, LintelSettings
 from kmn_perception.doors.search_settings import (
     FloorSettings,
     LineSettings,

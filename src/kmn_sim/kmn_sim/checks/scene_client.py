@@ -57,7 +57,7 @@ class SceneClient:
     def __init__(
         self, node: Node, processes: list[NodeProcess], settings: PerceptionCheckSettings
     ) -> None:
-        self._timeout = settings.answer_timeout
+        self._timeout, self._creep = settings.answer_timeout, settings.creep
         self._client = ProcessClient(node, processes)
         self._estimates: list[tuple[MorphingParameters, float]] = []
         self._truths: list[MorphingParameters] = []
@@ -108,7 +108,11 @@ class SceneClient:
 
     def _answered(self, values: NDArray[np.float64]) -> tuple[MorphingParameters, float] | None:
         """Return an estimate of an exposure of the scene; one of the scene before may come late."""
-        stamps = [t.header.stamp for t in self._truths if np.allclose([*t.theta, *t.gamma], values)]
+        stamps = [
+            truth.header.stamp
+            for truth in self._truths
+            if np.abs(np.array([*truth.theta, *truth.gamma]) - values).max() < self._creep
+        ]
         return next((pair for pair in self._estimates if pair[0].header.stamp in stamps), None)
 
 

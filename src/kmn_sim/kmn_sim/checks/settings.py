@@ -56,6 +56,8 @@ class PerceptionCheckSettings(NamedTuple):
     ----------
     tolerance
         Of the errors: metres, radians and scales.
+    creep
+        By which parameters of an object that stands may change: in physics boxes creep.
     margin
         Pixels of the image around an object that is wholly in view.
     camera_rate
@@ -65,6 +67,7 @@ class PerceptionCheckSettings(NamedTuple):
     """
 
     tolerance: Positive
+    creep: Positive
     margin: NonNegative
     camera_rate: Positive
     start_timeout: Positive

@@ -16,13 +16,15 @@ ROWS = 64  # cells above each other, from the view's top
 _HIGH, _WIDE = 8, 4  # pixels of the view in a cell
 _SMOOTHING = 1.5  # pixels
 _STEP, _OFFSET = 0.4, 12.0  # largest step of the logarithm of grey, and offset in pixel noises
+_ASIDE = 2.0  # largest tangent of the angle to the wall's normal
 
 
 def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]:
-    """Return the cells (6, ROWS, N) of a view, -1 to 1.
+    """Return the cells (7, ROWS, N) of a view, -1 to 1.
 
     They are: step to the right and step downwards of the logarithm of grey, offset of the inverse
-    depth, and the shares that are measured, in the image, and hidden by something before the wall.
+    depth, the shares that are measured, in the image, and hidden by something before the wall, and
+    how far the camera looks aside: on one side of a door it sees into the reveal.
 
     Parameters
     ----------
@@ -50,6 +52,10 @@ def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]
         2.0 * _mean(view.inside.astype(np.float32)) - 1.0,
         2.0 * _mean((offset > before).astype(np.float32)) - 1.0,
     ]
+    middles = column_of(view, np.arange(columns, dtype=np.float64))
+    aside = view.s[0] + middles * (view.s[1] - view.s[0])
+    level = np.clip(aside / view.frame.distance / _ASIDE, -1.0, 1.0)
+    channels.append(np.broadcast_to(level, (ROWS, columns)))
     return np.stack(channels).astype(np.float32)
 
 
@@ -111,4 +117,5 @@ def describe_cells(settings: DoorSettings) -> dict[str, Any]:
         "step": _STEP,
         "offset": _OFFSET * noise,
         "before": view.before * noise,
+        "aside": _ASIDE,
     }

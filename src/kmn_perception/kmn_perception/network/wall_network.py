@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-CHANNELS, ROWS = 6, 64  # of a view's cells
+CHANNELS, ROWS = 7, 64  # of a view's cells
 KINDS = ("lever", "knob", "bar")
+EDGES = ("left", "right", "panel_left", "panel_right")  # of the frame, and of the panel in it
 _DILATIONS = (1, 2, 4, 8, 16, 24)
 _NO_HANDLE = 3.0  # where the logit of no handle starts
 
@@ -22,9 +23,9 @@ class Logits(NamedTuple):
     Attributes
     ----------
     edges
-        (B, 2, N) left and right edge of the door by column.
+        (B, 4, N) upright edges by column, see ``EDGES``.
     none
-        (B, 3) that there is no left edge, no right edge, no handle.
+        (B, 5) that none is seen of each of these, and no handle.
     top
         (B, ROWS, N) the door's top by row, for doors over each column.
     handle
@@ -51,8 +52,8 @@ class WallNetwork(nn.Module):
             nn.Conv1d(width, width, 5, padding=2 * d, dilation=d, groups=4) for d in _DILATIONS
         )
         self.mix = nn.ModuleList(nn.Conv1d(width, width, 1) for _ in _DILATIONS)
-        self.edges = nn.Conv1d(width, 2, 5, padding=2)
-        self.none = nn.Linear(width, 3)
+        self.edges = nn.Conv1d(width, len(EDGES), 5, padding=2)
+        self.none = nn.Linear(width, len(EDGES) + 1)
         self.context = nn.Conv1d(width, 16, 1)
         self.joined = nn.Conv2d(48, 32, 3, padding=1)
         self.top = nn.Conv2d(32, 4, 1)
@@ -69,7 +70,8 @@ class WallNetwork(nn.Module):
         for along, mix in zip(self.along, self.mix, strict=True):
             y = y + mix(functional.relu(along(y)))
         y = functional.relu(y)
-        none = self.none(y.amax(dim=2)) + torch.tensor([0.0, 0.0, _NO_HANDLE], device=y.device)
+        start = torch.tensor([0.0] * len(EDGES) + [_NO_HANDLE], device=y.device)
+        none = self.none(y.amax(dim=2)) + start
         context = self.context(y)[:, :, None].expand(count, 16, rows // 4, columns)
         joined = functional.relu(self.joined(torch.cat([x, context], dim=1)))
         return Logits(
@@ -85,16 +87,15 @@ class Proposals(NamedTuple):
 
     Attributes
     ----------
-    left, right
-        (N + 1,) probabilities of the edges by column; the last one: there is none.
+    edges
+        (4, N + 1) probabilities of the edges by column, see ``EDGES``; the last one: none is seen.
     top
         (ROWS, N) logits of the top by row, see `top_over`.
     handle
         (3, ROWS, N) probabilities of the handle by kind and cell.
     """
 
-    left: NDArray[np.float32]
-    right: NDArray[np.float32]
+    edges: NDArray[np.float32]
     top: NDArray[np.float32]
     handle: NDArray[np.float32]
 
@@ -113,10 +114,10 @@ def propose(network: WallNetwork, cells: NDArray[np.float32]) -> Proposals:
 
 def proposals_of(logits: Logits) -> Proposals:
     """Return what the logits of one view (B = 1) propose."""
-    edges = torch.cat([logits.edges, logits.none[:, :2, None]], dim=2).softmax(dim=2)[0]
-    handle = torch.cat([logits.handle.reshape(1, -1), logits.none[:, 2:]], dim=1)
+    edges = torch.cat([logits.edges, logits.none[:, :-1, None]], dim=2).softmax(dim=2)[0]
+    handle = torch.cat([logits.handle.reshape(1, -1), logits.none[:, -1:]], dim=1)
     handle = handle.softmax(dim=1)[0, :-1].reshape(logits.handle.shape[1:])
-    return Proposals(edges[0].numpy(), edges[1].numpy(), logits.top[0].numpy(), handle.numpy())
+    return Proposals(edges.numpy(), logits.top[0].numpy(), handle.numpy())
 
 
 def _finer(values: Tensor, kinds: int) -> Tensor:

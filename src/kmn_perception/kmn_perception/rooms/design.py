@@ -16,18 +16,9 @@ from kmn_perception.rooms.settings import DoorSettings
 
 SAMPLES = 101  # of an edge
 BESIDE = 0.01  # metres from an edge to where the panel is looked for
-BUILT_IN = (
-    "panel",
-    "handle",
-    "fitting",
-    "sign",
-    "moulding",
-    "hinge",
-    "post",
-    "lintel",
-    "wall",
-    "seal",
-)
+ON_PANEL = ("panel", "handle", "fitting", "sign", "moulding", "hinge")
+AROUND = ("post", "lintel", "wall")
+BUILT_IN = (*ON_PANEL, *AROUND, "seal")
 CORNERS = {
     "top_left": (0.5, 0.5),
     "top_right": (-0.5, 0.5),
@@ -90,22 +81,32 @@ def corners(design: Design, model: RoomModel) -> dict[str, NDArray[np.float64]]:
     }
 
 
+def opening(design: Design, model: RoomModel) -> dict[str, NDArray[np.float64]]:
+    """Return the corners (3,) of the closed panel, in the front of the frame or wall around it."""
+    closed = design._replace(nuisance=design.nuisance | {"opening": 0.0})
+    before = design.nuisance["recess"] + design.nuisance["frame_proud"]
+    shift = before * model.pose(design.values)[:3, 0]
+    return {name: corner - shift for name, corner in corners(closed, model).items()}
+
+
 def truth(design: Design, model: RoomModel, camera: Camera) -> Door:
     """Return the truth about a door that a camera sees."""
     theta, gamma = model.model.split(design.values)
     frame = model.pose(design.values, design.side, design.nuisance["opening"])
     to_camera = camera.world_to_camera
-    found = corners(design, model)
+
+    def seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(to_camera[:3, :3] @ point + to_camera[:3, 3])
+
     handle = frame[:3, :3] @ model.model.body("handle").centre(gamma) + frame[:3, 3]
     if design.side == "left":  # the panel's own y axis points to the right as seen
         frame = frame @ np.diag([1.0, -1.0, 1.0, 1.0])
     return Door(
         **design._asdict(),
         frame=frame,
-        corners={name: to_camera[:3, :3] @ p + to_camera[:3, 3] for name, p in found.items()},
-        handle_centre=None
-        if design.handle == "none"
-        else to_camera[:3, :3] @ handle + to_camera[:3, 3],
+        corners={name: seen(point) for name, point in corners(design, model).items()},
+        opening={name: seen(point) for name, point in opening(design, model).items()},
+        handle_centre=None if design.handle == "none" else seen(handle),
     )
 
 
@@ -120,14 +121,35 @@ def seen_edges(door: Door, room: Room, bodies: NDArray[np.int16]) -> dict[str, f
     bodies
         (height, width) index of the cuboid that is seen, see `Images`.
     """
-    own = np.array([body.name.partition("_")[0] in BUILT_IN for body in room.cuboids])
+    return _shares_seen(door.corners, BESIDE, BUILT_IN, room, bodies)
+
+
+def seen_panel_edges(door: Door, room: Room, bodies: NDArray[np.int16]) -> dict[str, float]:
+    """Return which fractions of the panel's edges are seen on the panel itself."""
+    return _shares_seen(door.corners, BESIDE, ON_PANEL, room, bodies)
+
+
+def seen_opening(door: Door, room: Room, bodies: NDArray[np.int16]) -> dict[str, float]:
+    """Return which fractions of the opening's edges are seen on the frame or wall around it."""
+    return _shares_seen(door.opening, -BESIDE, AROUND, room, bodies)
+
+
+def _shares_seen(
+    corners: dict[str, NDArray[np.float64]],
+    inwards: float,
+    names: tuple[str, ...],
+    room: Room,
+    bodies: NDArray[np.int16],
+) -> dict[str, float]:
+    """Return which fractions of the edges show bodies of some names, so far inwards, metres."""
+    own = np.array([body.name.partition("_")[0] in names for body in room.cuboids])
     camera, fractions = replace(room.camera, pose=np.eye(4)), {}
-    centre = np.mean(list(door.corners.values()), axis=0)
+    centre = np.mean(list(corners.values()), axis=0)
     for name, ends in EDGES.items():
-        start, end = (door.corners[corner] for corner in ends)
-        inwards = centre - (start + end) / 2.0
+        start, end = (corners[corner] for corner in ends)
+        to_centre = centre - (start + end) / 2.0
         line = start + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (end - start)
-        pixels = camera.project(line + BESIDE * inwards / np.linalg.norm(inwards))
+        pixels = camera.project(line + inwards * to_centre / np.linalg.norm(to_centre))
         found = bodies[tuple(np.rint(pixels[inside(pixels, camera), 1::-1]).astype(int).T)]
         fractions[name] = float(own[found[found >= 0]].sum() / SAMPLES)
     return fractions

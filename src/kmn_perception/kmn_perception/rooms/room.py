@@ -94,6 +94,8 @@ class Door:
         z up from the floor.
     corners
         By name (``top_left`` as seen), (3,) corners of the panel's front, optical frame, metres.
+    opening
+        The same of the front of what is around the closed panel: of its frame, or of the wall.
     handle_centre
         (3,) middle of the handle, optical frame, metres; None without one.
     """
@@ -105,6 +107,7 @@ class Door:
     fitting: str
     frame: NDArray[np.float64]
     corners: dict[str, NDArray[np.float64]]
+    opening: dict[str, NDArray[np.float64]]
     handle_centre: NDArray[np.float64] | None
 
 

@@ -55,9 +55,12 @@ def _seen_beside(room: Room, step: float) -> Room:
     pose[:3, 3] += step * pose[:3, 0]
     shift = np.array([-step, 0.0, 0.0])  # of all that is told in the optical frame
     if door is not None:
-        corners = {name: corner + shift for name, corner in door.corners.items()}
+        corners, opening = (
+            {name: corner + shift for name, corner in found.items()}
+            for found in (door.corners, door.opening)
+        )
         handle = None if door.handle_centre is None else door.handle_centre + shift
-        door = replace(door, corners=corners, handle_centre=handle)
+        door = replace(door, corners=corners, opening=opening, handle_centre=handle)
     return replace(room, camera=replace(camera, pose=pose), door=door)
 
 

@@ -11,7 +11,8 @@ from kmn_perception.training.wall.targets import Target
 
 _STEPS = slice(0, 2)  # channels of the cells, see `cells_of`: steps of grey to the right and down,
 _RIGHT, _OFFSET = 0, 2  # the first of them, offsets of the inverse depth,
-_SHARES = slice(3, 6)  # and shares of a cell, which are -1 where there is nothing
+_SHARES = slice(3, 6)  # shares of a cell, which are -1 where there is nothing,
+_ASIDE = 6  # and how far the camera looks aside
 
 
 def window(
@@ -22,7 +23,7 @@ def window(
     cells, target = _cut(sample, first, settings.columns), sample.target.shifted(first)
     if generator.random() < settings.mirror:
         cells, target = cells[:, :, ::-1].copy(), target.mirrored(settings.columns)
-        cells[_RIGHT] *= -1.0
+        cells[[_RIGHT, _ASIDE]] *= -1.0
     if generator.random() < settings.invert:
         cells[_STEPS] *= -1.0
     if generator.random() < settings.weaken.share:

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from kmn_perception.network.wall_network import KINDS, ROWS, Logits
+from kmn_perception.network.wall_network import EDGES, KINDS, ROWS, Logits
 from kmn_perception.training.wall.settings import LossWeights, Spread
 from kmn_perception.training.wall.targets import NO_HANDLE, Target
 
@@ -23,7 +23,7 @@ class SoftTargets(NamedTuple):
     Attributes
     ----------
     edges
-        (B, 2, N + 1) of left and right edge; the last column: there is none.
+        (B, 4, N + 1) of the upright edges; the last column: none is seen.
     top, over, top_known
         (B, ROWS + 1), of which the last one: not seen; (B, N) mean over the door's columns; and
         (B,) weights.
@@ -55,7 +55,7 @@ def soft_targets(targets: Sequence[Target], columns: int, spread: Spread) -> Sof
     """Return what shall be answered for views of so many columns."""
     count = len(targets)
     soft = SoftTargets(
-        edges=torch.zeros(count, 2, columns + 1),
+        edges=torch.zeros(count, len(EDGES), columns + 1),
         top=torch.zeros(count, ROWS + 1),
         over=torch.zeros(count, columns),
         top_known=torch.zeros(count),
@@ -63,8 +63,8 @@ def soft_targets(targets: Sequence[Target], columns: int, spread: Spread) -> Sof
         handle_known=torch.ones(count),
     )
     for i, target in enumerate(targets):
-        for side, edge in enumerate((target.left, target.right)):
-            soft.edges[i, side] = _line(edge, columns, spread.edge)
+        for k, name in enumerate(EDGES):
+            soft.edges[i, k] = _line(getattr(target, name), columns, spread.edge)
         if np.isfinite(target.left + target.right):
             first, last = max(int(target.left), 0), min(int(target.right), columns - 1)
             if last - first > _MIN_COLUMNS:
@@ -77,10 +77,10 @@ def soft_targets(targets: Sequence[Target], columns: int, spread: Spread) -> Sof
 
 def losses(logits: Logits, soft: SoftTargets) -> Losses:
     """Return the losses of what a network says."""
-    edges = torch.cat([logits.edges, logits.none[:, :2, None]], dim=2)
+    edges = torch.cat([logits.edges, logits.none[:, :-1, None]], dim=2)
     top = (logits.top * soft.over[:, None]).sum(dim=2)
     top = torch.cat([top, torch.zeros_like(top[:, :1])], dim=1)
-    handle = torch.cat([logits.handle.flatten(1), logits.none[:, 2:]], dim=1)
+    handle = torch.cat([logits.handle.flatten(1), logits.none[:, -1:]], dim=1)
     return Losses(
         edges=_cross_entropy(edges, soft.edges).mean(),
         top=_mean(_cross_entropy(top, soft.top), soft.top_known),

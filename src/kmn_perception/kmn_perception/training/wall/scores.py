@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from kmn_perception.network.wall_network import ROWS, Proposals
+from kmn_perception.network.wall_network import EDGES, ROWS, Proposals
 from kmn_perception.training.wall.settings import ScoreSettings
 from kmn_perception.training.wall.targets import NO_HANDLE, Target
 
@@ -33,13 +33,14 @@ class Scores:
         side to which of the true edges that place is nearer.
         """
         high, wide = self._cell
-        columns = len(proposals.left) - 1
-        for answer, truth in ((proposals.left, target.left), (proposals.right, target.right)):
+        columns = proposals.edges.shape[1] - 1
+        for name, answer in zip(EDGES, proposals.edges, strict=True):
+            truth, of = getattr(target, name), "panel_edges" if "panel" in name else "edges"
             if 0.0 <= truth < columns:
                 near = np.abs(np.arange(columns) - truth) * wide <= self._settings.edge
-                self._count("edges", answer[:-1][near].sum() > 0.5)
+                self._count(of, answer[:-1][near].sum() > 0.5)
             else:
-                self._count("no_edges", answer[-1] > 0.5)
+                self._count(f"no_{of}", answer[-1] > 0.5)
         edges = np.array([target.left, target.right])
         first, last = np.clip(edges, 0.0, columns - 1.0)
         if last - first > 1.0 and 0.0 <= target.top < ROWS:

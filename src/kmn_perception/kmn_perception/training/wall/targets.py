@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kmn_perception.doors.view_cells import cell_of, height_of
 from kmn_perception.doors.wall_view import WallView
 from kmn_perception.network.wall_network import KINDS
-from kmn_perception.rooms.design import seen_edges
+from kmn_perception.rooms.design import EDGES, seen_edges, seen_opening, seen_panel_edges
 from kmn_perception.rooms.rendering import Images
 from kmn_perception.rooms.room import Door, Room
 from kmn_perception.training.wall.settings import TargetSettings
@@ -27,7 +27,9 @@ class Target(NamedTuple):
     door
         1 where the view shows the wall of a door, else 0.
     left, right
-        Columns of its upright edges; NaN where they are not seen.
+        Columns of the upright edges of the frame, or wall, around it; NaN where they are not seen.
+    panel_left, panel_right
+        Of the panel's own; NaN also where the frame hides them.
     top
         Its row.
     handle_row, handle_column
@@ -39,6 +41,8 @@ class Target(NamedTuple):
     door: float
     left: float = np.nan
     right: float = np.nan
+    panel_left: float = np.nan
+    panel_right: float = np.nan
     top: float = np.nan
     handle_row: float = np.nan
     handle_column: float = np.nan
@@ -49,6 +53,8 @@ class Target(NamedTuple):
         return self._replace(
             left=self.left - columns,
             right=self.right - columns,
+            panel_left=self.panel_left - columns,
+            panel_right=self.panel_right - columns,
             handle_column=self.handle_column - columns,
         )
 
@@ -56,7 +62,11 @@ class Target(NamedTuple):
         """Return the target in the mirrored view of so many columns."""
         last = columns - 1
         return self._replace(
-            left=last - self.right, right=last - self.left, handle_column=last - self.handle_column
+            left=last - self.right,
+            right=last - self.left,
+            panel_left=last - self.panel_right,
+            panel_right=last - self.panel_left,
+            handle_column=last - self.handle_column,
         )
 
 
@@ -65,18 +75,20 @@ def target_of(view: WallView, room: Room, images: Images, settings: TargetSettin
     door, frame = room.door, view.frame
     if door is None or not _is_shown(view, door, settings):
         return Target(0.0)
-    seen = seen_edges(door, room, images.bodies)
-    corner = door.corners
-    # The edge of a recessed door is that of its frame or of its panel: between both.
-    recess = 0.5 * max(door.nuisance["recess"], 0.0) * frame.normal
     columns = {}
-    for side in ("left", "right"):
-        edge = (corner[f"top_{side}"] + corner[f"bottom_{side}"]) / 2.0 + recess
-        columns[side] = _cell(view, edge)[1] if seen[side] >= settings.seen.edge else np.nan
+    for prefix, corners, seen in (
+        ("", door.opening, seen_opening(door, room, images.bodies)),
+        ("panel_", door.corners, seen_panel_edges(door, room, images.bodies)),
+    ):
+        for side in ("left", "right"):
+            edge = np.mean([corners[name] for name in EDGES[side]], axis=0)
+            is_seen = seen[side] >= settings.seen.edge
+            columns[prefix + side] = _cell(view, edge)[1] if is_seen else np.nan
     top = np.nan
-    if seen["top"] >= settings.seen.top:
-        rows = [_cell(view, corner[name] + recess)[0] for name in ("top_left", "top_right")]
-        top = float(np.mean(rows))
+    if seen_edges(door, room, images.bodies)["top"] >= settings.seen.top:
+        # That of a recessed door is its frame's or its panel's: between both.
+        ends = [at[name] for at in (door.corners, door.opening) for name in EDGES["top"]]
+        top = float(np.mean([_cell(view, end)[0] for end in ends]))
     if door.handle_centre is None:
         return Target(1.0, **columns, top=top, kind=NO_HANDLE)
     row, column = _cell(view, door.handle_centre)

@@ -173,7 +173,7 @@ class DoorPipeline:
                 f"the handle is a {kind}, of which model '{self.model.name}' knows nothing "
                 f"(known: {', '.join(known)})"
             )
-        if found.status is DoorStatus.HANDLE_NOT_SEEN and is_open and not found.handle_side:
+        if found.status is DoorStatus.HANDLE_NOT_SEEN and is_open and not found.hinge_is_known:
             return Status.AMBIGUOUS, (
                 f"the door is open by {np.degrees(abs(found.value(OPENING))):.0f} deg, and without "
                 "a handle in sight it is not known which side is hinged"
@@ -184,7 +184,7 @@ class DoorPipeline:
         """Return a door that was found, in the world of its camera's pose."""
         values, covariance = found.values[:7], found.covariance[:7, :7]
         theta, gamma = self.model.split(values)
-        side = found.handle_side or "right"
+        side = found.latch_side
         opening = found.value(OPENING)
         deviation = max(found.deviation(OPENING), self.finder.settings.fit.closed)
         is_open = abs(opening) > SIGNIFICANT * deviation

@@ -32,6 +32,8 @@ class DoorEstimate:
         (9,) and (9, 9) parameters of the door, see `DOOR`; NaN where there is none.
     handle_side, handle_kind
         ``left`` or ``right`` as seen; ``lever`` or ``knob``; empty where it is not seen.
+    latch_side, hinge_is_known
+        Side at which the parameters take the latch to be, and whether handle or opening tell it.
     camera_pose
         (4, 4) optical frame in the world, whose origin is on the floor below the camera.
     corners
@@ -52,6 +54,8 @@ class DoorEstimate:
     covariance: NDArray[np.float64]
     handle_side: str
     handle_kind: str
+    latch_side: str
+    hinge_is_known: bool
     camera_pose: NDArray[np.float64]
     corners: NDArray[np.float64]
     handle: NDArray[np.float64]
@@ -70,6 +74,8 @@ class DoorEstimate:
             covariance=np.full((n, n), np.nan),
             handle_side="",
             handle_kind="",
+            latch_side="right",
+            hinge_is_known=False,
             camera_pose=np.full((4, 4), np.nan),
             corners=np.full((4, 3), np.nan),
             handle=np.full(3, np.nan),

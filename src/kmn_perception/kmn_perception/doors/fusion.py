@@ -121,6 +121,8 @@ def agree(a: DoorEstimate, b: DoorEstimate, deviations: float) -> bool:
     for one, other in ((a.handle_side, b.handle_side), (a.handle_kind, b.handle_kind)):
         if one and other and one != other:
             return False
+    if a.hinge_is_known and b.hinge_is_known and a.latch_side != b.latch_side:
+        return False
     difference = a.values - b.values
     difference[_YAW] = _wrap(difference[_YAW])
     allowed = deviations * np.sqrt(np.diag(a.covariance) + np.diag(b.covariance))
@@ -142,6 +144,7 @@ def fuse(estimates: Sequence[DoorEstimate], settings: FusionSettings) -> DoorEst
     seen = [one for one in estimates if one.handle_side]
     is_seen = len(seen) >= max(settings.handle * len(estimates), 1.0)
     used = seen if is_seen else [one for one in estimates if not one.handle_side]
+    used = [one for one in used if one.latch_side == used[-1].latch_side]
     newest, n = used[-1], len(used)
     values = np.array([one.values for one in used])
     values[:, _YAW] = newest.values[_YAW] + _wrap(values[:, _YAW] - newest.values[_YAW])

@@ -21,8 +21,10 @@ MEASURED = (
     "top_rise",                   # direction of the top, up per metre away, above the middle
     "handle", "handle_rise",      # directions to the right, and up, per metre away
     "protrusion",                 # of the handle's middle before the panel, metres
+    "proud",                      # by how much the frame stands out of the wall, metres
 )  # fmt: skip
 EDGES = slice(5, 9)  # of these: what is measured of the upright edges
+PROUD = 13
 # What follows. Metres and radians; the world's origin lies on the floor below the camera, x points
 # where the camera looks, z up. `x`, `y`, `yaw` are those of the closed door, and `opening` is
 # positive away from the camera, see the model.
@@ -61,25 +63,32 @@ class DoorShape(NamedTuple):
     recess: NDArray[np.float64]
 
 
-def door_shape(m: NDArray[np.float64], handle_left: bool, ajar: bool) -> DoorShape:
-    """Return the door's points from the measurements (..., 13), see `MEASURED`."""
+def door_shape(m: NDArray[np.float64], hinge_right: bool, ajar: bool) -> DoorShape:
+    """Return the door's points from the measurements (..., 14), see `MEASURED`."""
     wall, panel = m[..., 0:2], m[..., 2:4]
     toward = -_unit(wall)  # the wall's normal, towards the camera
-    corners = []
+    front = wall / (1.0 - m[..., PROUD : PROUD + 1] * _length(wall))  # of the frame
+    corners, frames = [], []
     for direction, on_panel in ((m[..., 5], m[..., 7]), (m[..., 6], m[..., 8])):
         ray = _ray(direction)
-        on_wall = ray / _dot(wall, ray)
+        on_frame = ray / _dot(front, ray)
         seen = ray / _dot(panel, ray)
         # The frame's edge, moved along the wall's normal onto the panel.
-        behind = on_wall + toward * (1.0 - _dot(panel, on_wall)) / _dot(panel, toward)
+        behind = on_frame + toward * (1.0 - _dot(panel, on_frame)) / _dot(panel, toward)
         share = on_panel[..., None]
         corners.append((1.0 - share) * behind + share * seen)
+        frames.append((on_frame, seen, share))
+    hinge, swung = (1, 0) if hinge_right else (0, 1)
+    if ajar:  # the swung edge is as far from the hinge as that of the frame
+        on_frame, seen, share = frames[swung]
+        apart = _dot(on_frame - corners[hinge], _along(wall))
+        behind = corners[hinge] + apart * _along(panel)
+        corners[swung] = (1.0 - share) * behind + share * seen
     left, right = corners
     turn = np.arctan2(panel[..., 0], panel[..., 1]) - np.arctan2(wall[..., 0], wall[..., 1])
     ray = _ray(m[..., 10])
     grip = ray * (1.0 - m[..., 12:13] * _length(panel)) / _dot(panel, ray)
-    hinge = right if handle_left else left
-    at = hinge if ajar else 0.5 * (left + right)
+    at = corners[hinge] if ajar else 0.5 * (left + right)
     recess = (_dot(wall, at) - 1.0) / _length(wall)
     over = _ray(0.5 * (m[..., 5] + m[..., 6]))
     top = 1.0 / m[..., 4] + m[..., 9] / _dot(wall, over)[..., 0]
@@ -88,18 +97,18 @@ def door_shape(m: NDArray[np.float64], handle_left: bool, ajar: bool) -> DoorSha
 
 
 def door_values(
-    m: NDArray[np.float64], handle_left: bool, ajar: bool, look: View2d
+    m: NDArray[np.float64], hinge_right: bool, ajar: bool, look: View2d
 ) -> NDArray[np.float64]:
-    """Return the parameters (..., 9), see `DOOR`, of measurements (..., 13), see `MEASURED`."""
-    shape = door_shape(m, handle_left, ajar)
+    """Return the parameters (..., 9), see `DOOR`, of measurements (..., 14), see `MEASURED`."""
+    shape = door_shape(m, hinge_right, ajar)
     width = _length(shape.right - shape.left)
     along = (shape.right - shape.left) / width
-    latch, hinge = (shape.left, shape.right) if handle_left else (shape.right, shape.left)
-    inset = _dot(shape.handle - latch, along)[..., 0] * (1.0 if handle_left else -1.0)
+    latch, hinge = (shape.left, shape.right) if hinge_right else (shape.right, shape.left)
+    inset = _dot(shape.handle - latch, along)[..., 0] * (1.0 if hinge_right else -1.0)
     panel = _unit(m[..., 2:4])
     axis = _unit(m[..., 0:2]) if ajar else panel
     across = axis @ np.array([[0.0, -1.0], [1.0, 0.0]])  # along the wall, to the right
-    middle = hinge + across * (-0.5 if handle_left else 0.5) * width
+    middle = hinge + across * (-0.5 if hinge_right else 0.5) * width
     middle = middle + panel * PANEL_FRONT  # it turns about a point of its middle plane
     place, heading = look.to_world(middle), look.to_world(axis)
     door_height = shape.top - HEIGHT
@@ -112,7 +121,7 @@ def door_values(
             width[..., 0] - WIDTH,
             inset - HANDLE_INSET,
             shape.handle_height - HANDLE_HEIGHT - 0.5 * door_height,
-            shape.opening if handle_left else -shape.opening,
+            shape.opening if hinge_right else -shape.opening,
             shape.recess,
         ],
         axis=-1,
@@ -152,6 +161,11 @@ def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
 def _length(a: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lengths (..., 1) of vectors (..., 2)."""
     return np.hypot(a[..., :1], a[..., 1:])
+
+
+def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the directions (..., 2) along lines (b, c), to the right."""
+    return np.stack([line[..., 1], -line[..., 0]], axis=-1) / _length(line)
 
 
 def _unit(a: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import cv2
@@ -72,6 +73,7 @@ class Handle(NamedTuple):
 def find_handle(
     frame: WallFrame,
     edges: tuple[float, float],
+    sides: Collection[str],
     depth: NDArray[np.float32],
     grey: NDArray[np.float32] | None,
     camera: Camera,
@@ -87,6 +89,8 @@ def find_handle(
         The panel's plane.
     edges
         Left and right, metres along it.
+    sides
+        At which of them it may be.
     depth, grey
         (height, width) metres, 0 for none; 0 to 1 or None.
     step_noise
@@ -108,6 +112,7 @@ def find_handle(
         "right": (s < right + shifts[right] + 0.01) & (s > right + shifts[right] - settings.reach),
     }
     middle = ~(windows["left"] | windows["right"]) & (s > left) & (s < right)
+    windows = {side: window & (side in sides) for side, window in windows.items()}
     level = (z > low) & (z < high)
     if grey is not None:
         return _in_grey(view, windows, middle, level, edges, shifts, settings, hint)
@@ -146,9 +151,9 @@ def _in_grey(
     other = peaks[side] / max(peaks["right" if side == "left" else "left"], noise)
     ratio = peaks[side] / noise
     if peaks[side] < trust.contrast or ratio < trust.ratio or other < trust.other:
-        return _as_hinted(hint, edges, settings)
+        return _as_hinted(hint, edges, windows, settings)
     if hint is not None and trust is settings.confirmed and hint.kind == "bar":
-        return _as_hinted(hint, edges, settings)
+        return _as_hinted(hint, edges, windows, settings)
     masked = np.where(windows[side], answer, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
     panel = (view.s > edges[0]) & (view.s < edges[1])
@@ -165,12 +170,17 @@ def _in_grey(
 
 
 def _as_hinted(
-    hint: Hint | None, edges: tuple[float, float], settings: HandleSettings
+    hint: Hint | None,
+    edges: tuple[float, float],
+    windows: dict[str, NDArray[np.bool_]],
+    settings: HandleSettings,
 ) -> Handle | None:
     """Return the handle that the network alone sees, if it is sure of it."""
     if hint is None or hint.probability < settings.sure:
         return None
     side = "left" if abs(hint.s - edges[0]) < abs(hint.s - edges[1]) else "right"
+    if not windows[side].any():
+        return None
     along, up = settings.hint_noise
     if hint.kind == "bar":
         up = settings.bar_noise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import NamedTuple
 
@@ -9,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
-from kmn_perception.doors.edges import both_seen, measure_edge, reveal_pair, rivals
+from kmn_perception.doors.edges import measure_edge
 from kmn_perception.doors.geometry import (
     DOOR,
     EDGES,
     HANDLE_INSET,
+    MEASURED,
+    PROUD,
     DoorShape,
     View2d,
     door_shape,
@@ -22,10 +25,12 @@ from kmn_perception.doors.geometry import (
 )
 from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.layout import OPPOSITE, SIDES, lay_out, read_at
 from kmn_perception.doors.lintel import Lintel, find_lintel
 from kmn_perception.doors.proposals import handle_of
-from kmn_perception.doors.settings import DoorSettings, RevealSettings
-from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
+from kmn_perception.doors.readings import EdgeReading
+from kmn_perception.doors.settings import DoorSettings
+from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.doors.walls import Frame
@@ -45,12 +50,17 @@ class Measurement(NamedTuple):
         whether it is the frame's or the panel's, but not the error of the panel's plane.
     handle
         None where it is not seen.
+    latch, hinge_is_known
+        ``left`` or ``right``, at which the parameters take the latch to be, and whether an open
+        panel, or a handle, tell it.
     """
 
     candidate: Candidate
     surfaces: Surfaces
     lintel: Lintel
     handle: Handle | None
+    latch: str
+    hinge_is_known: bool
     shape: DoorShape
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
@@ -63,56 +73,67 @@ def measure(
 ) -> Measurement | None:
     """Measure a candidate; None where wall or panel are hardly seen."""
     at = candidate.view.frame
-    edges = [measure_edge(candidate, side, settings) for side in ("left", "right")]
-    directions = edges[0][0], edges[1][0]
-    surfaces = fit_surfaces(blocks, at, directions, height, settings.calibration, settings.fit)
-    if surfaces is None or not _is_possible(surfaces, directions, settings):
+    layout = lay_out(blocks, candidate, height, settings)
+    if layout is None:
         return None
-    heights = _lintel_heights(at, directions, surfaces, settings)
-    lintel = find_lintel(candidate, heights, settings.lintel)
+    surfaces, hinges, edges = layout
+    candidate = candidate._replace(left=edges["left"].line, right=edges["right"].line)
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
-    on_panel = tuple(_along(at, panel, surfaces, direction) for direction in directions)
-    if not on_panel[1] - on_panel[0] > settings.lines.tie:
+    left, right = (_along(at, panel, surfaces, edges[side].panel) for side in SIDES)
+    if not right - left > settings.lines.tie:
         return None  # so oblique a panel shows nothing
+    lintel = find_lintel(candidate, _lintel_heights(candidate, surfaces, settings), settings.lintel)
+    sides = tuple(OPPOSITE[hinge] for hinge in hinges) or SIDES
     handle = find_handle(
-        panel, (on_panel[0], on_panel[1]), frame.depth, frame.grey, frame.camera,
+        panel, (left, right), sides, frame.depth, frame.grey, frame.camera,
         settings.handle, settings.lines.step_noise, _hint(candidate, panel),
     )  # fmt: skip
     look = View2d(at.right[2], -at.normal[2])
-    ajar = surfaces.opening != 0.0
+    ajar = bool(hinges)
     for found in (handle, None):
+        latch, edges = _latch(found, hinges), layout.edges
+        if latch in hinges[:1]:  # the handle tells of two possible hinges which it is
+            edges = read_at(OPPOSITE[latch], candidate, surfaces, settings) or edges
         measured, covariance = _gather(
             candidate, panel, surfaces, edges, lintel, found, height, settings
         )
-        handle_left = found is not None and found.side == "left"
-        values_of = partial(door_values, handle_left=handle_left, ajar=ajar, look=look)
+        values_of = partial(door_values, hinge_right=latch == "left", ajar=ajar, look=look)
         values, spread = propagate(values_of, measured, covariance)
         handle = found
         if found is None or _is_on_panel(values, spread, settings):
             break  # else nothing that this handle told may remain
-    shape = door_shape(measured, handle_left, ajar)
     return Measurement(
         candidate,
         surfaces,
         lintel,
         handle,
-        shape,
+        latch,
+        handle is not None or len(hinges) == 1,
+        door_shape(measured, latch == "left", ajar),
         values,
         spread,
         float(measured[4]),
-        _edge_deviations(measured, covariance, handle_left, ajar),
+        _edge_deviations(measured, covariance, latch == "left", ajar),
     )
 
 
+def _latch(handle: Handle | None, hinges: tuple[str, ...]) -> str:
+    """Return the side of the latch; at the right of a closed door that does not show it."""
+    if handle is not None:
+        return handle.side
+    return OPPOSITE[hinges[0]] if hinges else "right"
+
+
 def _edge_deviations(
-    measured: NDArray[np.float64], covariance: NDArray[np.float64], handle_left: bool, ajar: bool
+    measured: NDArray[np.float64], covariance: NDArray[np.float64], hinge_right: bool, ajar: bool
 ) -> tuple[float, float]:
     """Return how well it is known which lines are the panel's edges, wherever its plane is."""
     own = np.zeros_like(covariance)
     own[EDGES, EDGES] = covariance[EDGES, EDGES]
+    own[PROUD, PROUD] = covariance[PROUD, PROUD]
 
     def corners(m: NDArray[np.float64]) -> NDArray[np.float64]:
-        shape = door_shape(m, handle_left, ajar)
+        shape = door_shape(m, hinge_right, ajar)
         return np.concatenate([shape.left, shape.right], axis=-1)
 
     variances = np.diag(propagate(corners, measured, own)[1])
@@ -129,16 +150,6 @@ def _is_on_panel(
     return bool(low - slack <= inset <= high + slack)
 
 
-def _is_possible(
-    surfaces: Surfaces, directions: tuple[float, float], settings: DoorSettings
-) -> bool:
-    """Return whether the camera, above a floor, sees wall and panel in both directions of edges."""
-    rays = np.array([[direction, 1.0] for direction in directions])
-    seen = np.stack([rays @ surfaces.values[WALL], rays @ surfaces.values[PANEL]])
-    reach = settings.view.reach
-    return bool((seen > 1.0 / reach).all() and surfaces.values[FLOOR] > 1.0 / reach)
-
-
 def _hint(candidate: Candidate, panel: WallFrame) -> Hint | None:
     """Return where on the panel a network sees a handle."""
     seen = handle_of(candidate)
@@ -152,10 +163,11 @@ def _hint(candidate: Candidate, panel: WallFrame) -> Hint | None:
 
 
 def _lintel_heights(
-    at: WallFrame, directions: tuple[float, float], surfaces: Surfaces, settings: DoorSettings
+    candidate: Candidate, surfaces: Surfaces, settings: DoorSettings
 ) -> tuple[float, float]:
     """Return where tops may be in the view, whose scale the fit may have corrected."""
-    middle = np.array([0.5 * sum(directions), 1.0])
+    at = candidate.view.frame
+    middle = np.array([0.5 * sum(candidate.directions), 1.0])
     scale = at.distance * float(surfaces.values[WALL] @ middle)
     floor = 1.0 / surfaces.values[FLOOR]
     low, high = ((z - floor) * scale + at.height for z in settings.lintel.heights)
@@ -179,38 +191,32 @@ def _gather(
     candidate: Candidate,
     panel: WallFrame,
     surfaces: Surfaces,
-    edges: list[tuple[float, float]],
+    edges: Mapping[str, EdgeReading],
     lintel: Lintel,
     handle: Handle | None,
     source: HeightSource,
     settings: DoorSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what was measured (13,) and its covariance, see `MEASURED`."""
-    at = candidate.view.frame
+    """Return what was measured (14,) and its covariance, see `MEASURED`."""
+    at, count = candidate.view.frame, len(MEASURED)
     wall_line, panel_line = surfaces.values[WALL], surfaces.values[PANEL]
-    values, deviations = np.zeros(13), np.zeros(13)
+    values, deviations = np.zeros(count), np.zeros(count)
     values[:5] = surfaces.values[:5]
-    for i, (direction, deviation) in enumerate(edges):
+    values[PROUD], deviations[PROUD] = settings.reveal.proud
+    for i, side in enumerate(SIDES):
+        edge = edges[side]
+        direction, deviation = measure_edge(candidate, edge.line, settings)
         values[5 + i] = direction
-        ray = np.array([direction, 1.0])
-        point = ray / (panel_line @ ray)
-        depth = float(wall_line @ point - 1.0) / float(np.linalg.norm(wall_line))
-        outward = direction < 0.0 if i == 0 else direction > 0.0
-        side = ("left", "right")[i]
-        told, pair = _whose(depth, outward, surfaces, settings.reveal), None
-        if told is None and candidate.view.grey is not None:
-            pair = reveal_pair(candidate, side, depth)
-            told = both_seen(candidate, side, pair, settings)
-        spread = rivals(candidate, side, pair or (), settings) / at.distance
-        deviations[5 + i] = np.hypot(deviation, spread)
-        values[7 + i], deviations[7 + i] = told or settings.reveal.visible
+        deviations[5 + i] = np.hypot(deviation, edge.spread / at.distance)
+        values[7 + i], deviations[7 + i] = edge.on_panel, edge.doubt
     expected = settings.prior.handle_height
     height = 1.0 / surfaces.values[FLOOR]
     if handle is None:
         # Where to look: at the usual place of the right edge.
-        far = 1.0 / float(panel_line @ np.array([edges[1][0], 1.0]))
-        values[10] = edges[1][0] - settings.prior.handle_inset[0] / far
-        deviations[10] = edges[1][0] - edges[0][0]
+        left, right = values[5:7]
+        far = 1.0 / float(panel_line @ np.array([right, 1.0]))
+        values[10] = right - settings.prior.handle_inset[0] / far
+        deviations[10] = right - left
         values[11], deviations[11] = (expected[0] - height) / far, 3.0 * expected[1] / far
     else:
         point = panel.points(np.array(handle.s), np.array(handle.z))
@@ -218,9 +224,9 @@ def _gather(
         values[10], values[11] = float(point @ at.right) / away, float(point @ at.up) / away
         deviations[10], deviations[11] = handle.along_noise / away, handle.up_noise / away
     values[12], deviations[12] = settings.handle.protrusion
-    covariance = np.zeros((13, 13))
+    covariance = np.zeros((count, count))
     covariance[:5, :5] = surfaces.covariance[:5, :5]
-    over = np.array([0.5 * (edges[0][0] + edges[1][0]), 1.0])
+    over = np.array([0.5 * (values[5] + values[6]), 1.0])
     far = 1.0 / float(wall_line @ over)
     rise = None if lintel.z is None else (lintel.z - at.height) / at.distance
     if source is HeightSource.USUAL:
@@ -246,32 +252,11 @@ def _gather(
     return values, covariance
 
 
-def _whose(
-    depth: float, outward: bool, surfaces: Surfaces, settings: RevealSettings
-) -> tuple[float, float] | None:
-    """Return whether an edge is the frame's (0) or the panel's own (1), and the deviation.
-
-    None where both are in sight.
-
-    Parameters
-    ----------
-    depth
-        Of the panel's edge behind the wall's face, metres.
-    outward
-        Whether the camera looks past the frame's edge onto the reveal behind it.
-    """
-    if surfaces.opening != 0.0 and abs(depth) > settings.swung:
-        return settings.own if outward or depth < 0.0 else settings.unknown
-    if depth < 0.0:
-        return settings.proud
-    return None if outward else settings.hidden
-
-
 def _usual_top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:
-    """Return height and standard deviation of a top that is not seen: above all that is seen."""
+    """Return height and standard deviation of a top that is not seen: above what is, or missed."""
     mean, deviation = settings.prior.height
-    low = min(max(lintel.seen_to, mean - 3.0 * deviation), mean + 2.0 * deviation)
-    grid = np.linspace(low, mean + 3.0 * deviation, 200)
+    grid = mean + deviation * np.linspace(-3.0, 3.0, 200)
     weights = np.exp(-0.5 * ((grid - mean) / deviation) ** 2)
+    weights[grid < lintel.seen_to] *= settings.lintel.missed
     value = float(np.average(grid, weights=weights))
     return value, float(np.sqrt(np.average((grid - value) ** 2, weights=weights)))

@@ -107,6 +107,8 @@ class LintelSettings:
         Distances from the upright edges between which a frame's top goes on, metres.
     passing
         By how much a line that goes on there, as clear as within, counts less.
+    missed
+        How likely a top that is in view is to be found nowhere.
     """
 
     heights: Interval
@@ -119,3 +121,4 @@ class LintelSettings:
     unlikely: Fraction
     beside: Interval
     passing: Fraction
+    missed: Fraction

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,11 @@ from kmn_perception.doors.lines import Line, Pieces
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of, cells_of, column_of, height_of
 from kmn_perception.doors.wall_view import WallView
-from kmn_perception.network.wall_network import KINDS, Proposals, WallNetwork, propose
+from kmn_perception.network.wall_network import EDGES, KINDS, Proposals, WallNetwork, propose
 
+PanelOrFrame = Literal["frame", "panel"]
 _LEAST = 1e-6  # probability of what a network finds impossible
+_PEAK = 0.5  # probability of the likeliest cell where a network is sure
 _BESIDE = 6  # cells beside an edge where what stands out may be seen
 
 
@@ -35,11 +37,15 @@ def with_proposals(
     narrow, wide = settings.verdict.width
     slack = settings.lines.tie
     lefts, rights = (
-        [_edge(view, pieces, lines, p, at, settings) for at in _peaks(p, settings.network.peaks)]
-        for p in (proposals.left, proposals.right)
+        [
+            _edge(view, pieces, lines, p, at, settings)
+            for p in (edge_map(proposals, side, "frame"), edge_map(proposals, side, "panel"))
+            for at in _peaks(p, settings.network.peaks)
+        ]
+        for side in ("left", "right")
     )
-    for left in lefts:
-        for right in rights:
+    for left in dict.fromkeys(lefts):
+        for right in dict.fromkeys(rights):
             width = (right.column - left.column) * pixel
             if narrow - slack <= width <= wide + slack:
                 score = score_of(left, right, width, lines, pieces, pixel, settings)
@@ -51,9 +57,10 @@ def with_proposals(
 
 def _judged(candidate: Candidate, proposals: Proposals, settings: DoorSettings) -> Candidate:
     view = candidate.view
-    left = round(cell_of(view, candidate.left.column))
-    right = round(cell_of(view, candidate.right.column))
-    confidence = near(proposals.left, left, 1) * near(proposals.right, right, 1)
+    confidence = 1.0
+    for side in ("left", "right"):
+        at = round(cell_of(view, candidate.edge(side).column))
+        confidence *= _either(proposals, side, at, 1)
     least = settings.network.min_confidence
     opinion = 1.0 - np.log(max(confidence, least)) / np.log(least)
     score = candidate.score + settings.score.network * float(opinion)
@@ -99,14 +106,63 @@ def edge_probability(candidate: Candidate, side: str) -> float:
     """Return the network's probability of a candidate's ``left`` or ``right`` edge; 0 without."""
     if candidate.proposals is None:
         return 0.0
-    found = candidate.proposals.left if side == "left" else candidate.proposals.right
-    return near(found, round(cell_of(candidate.view, candidate.edge(side).column)))
+    at = round(cell_of(candidate.view, candidate.edge(side).column))
+    return _either(candidate.proposals, side, at, 2)
 
 
-def near(probabilities: NDArray[np.float32], at: int, reach: int = 2) -> float:
+def edge_map(proposals: Proposals, side: str, of: PanelOrFrame) -> NDArray[np.float32]:
+    """Return the probabilities (N + 1,) of an edge by column; the last one: it is not seen."""
+    return proposals.edges[EDGES.index(side if of == "frame" else f"panel_{side}")]
+
+
+def edge_at(
+    candidate: Candidate, side: str, of: PanelOrFrame, column: float, settings: DoorSettings
+) -> float:
+    """Return how likely an edge is at a column of the view: 1 where the network is sure.
+
+    Also 1 without a network.
+    """
+    if candidate.proposals is None:
+        return 1.0
+    found = edge_map(candidate.proposals, side, of)[:-1]
+    at = cell_of(candidate.view, column)
+    density = float(np.interp(at, np.arange(len(found)), found, left=0.0, right=0.0))
+    return min(density / _PEAK, 1.0) + settings.network.unlikely
+
+
+def none_seen(candidate: Candidate, side: str, of: PanelOrFrame) -> float:
+    """Return the network's probability that an edge is not seen; 0 without a network."""
+    if candidate.proposals is None:
+        return 0.0
+    return float(edge_map(candidate.proposals, side, of)[-1])
+
+
+def peaks_of(
+    candidate: Candidate, side: str, of: PanelOrFrame, settings: DoorSettings
+) -> list[int]:
+    """Return the columns of the view at which the network sees an edge; none without a network."""
+    if candidate.proposals is None:
+        return []
+    found, columns = edge_map(candidate.proposals, side, of), []
+    for at in _peaks(found, settings.network.peaks):
+        if _near(found, at, 1) < settings.network.min_peak:
+            break
+        cells = np.arange(max(at - 1, 0), min(at + 2, len(found) - 1))
+        middle = np.average(cells, weights=found[cells])
+        column = round(float(column_of(candidate.view, middle)))
+        columns.append(min(max(column, 0), len(candidate.view.s) - 1))
+    return columns
+
+
+def _either(proposals: Proposals, side: str, at: int, reach: int) -> float:
+    """Return the probability that frame or panel has its edge about a column of cells."""
+    return max(_near(edge_map(proposals, side, of), at, reach) for of in ("frame", "panel"))
+
+
+def _near(probabilities: NDArray[np.float32], at: int, reach: int) -> float:
     """Return the probability of the columns about one of them."""
     last = len(probabilities) - 1  # that there is none
-    return float(probabilities[max(at - reach, 0) : min(at + reach + 1, last)].sum())
+    return float(probabilities[max(at - reach, 0) : max(min(at + reach + 1, last), 0)].sum())
 
 
 def _peaks(probabilities: NDArray[np.float32], count: int) -> list[int]:
@@ -135,7 +191,7 @@ def _edge(
     def weight(line: Line) -> float:
         clarity = line.contrast + settings.network.step * abs(line.step)
         clarity = max(clarity, settings.lines.min_contrast)
-        probability = near(probabilities, round(cell_of(view, line.column)), 1)
+        probability = _near(probabilities, round(cell_of(view, line.column)), 1)
         return weight_of(clarity, probability, settings)
 
     return max([unmarked, *near_by], key=weight)

@@ -194,6 +194,8 @@ class NetworkSettings(NamedTuple):
     ----------
     peaks
         Of each edge's probability that are looked at.
+    min_peak
+        Probability of one at which an edge is believed that shows no line.
     min_confidence
         Of a pair of edges that is measured at all.
     snap
@@ -207,6 +209,7 @@ class NetworkSettings(NamedTuple):
     """
 
     peaks: Count
+    min_peak: Fraction
     min_confidence: Fraction
     snap: Positive
     power: Positive

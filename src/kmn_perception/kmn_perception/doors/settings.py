@@ -141,33 +141,27 @@ class VerdictSettings:
 
 
 class RevealSettings(NamedTuple):
-    """Whose edge is seen, the frame's (0) or the panel's own (1): value and standard deviation.
+    """How edges of frame and panel are told apart.
 
     Attributes
     ----------
-    visible, hidden
-        Of a recessed panel, by depth alone where both edges are in sight, and where the frame
-        hides the panel's.
     line
         Metres within which a line is one of the two edges.
     unmarked
         Likelihood that such an edge shows no line.
+    least_doubt
+        Least standard deviation of whose edge is seen, the frame's (0) or the panel's own (1).
+    recess
+        Of hinges behind the wall, metres, from which to which they may be.
     proud
-        Of a panel that stands out of the wall.
-    swung
-        Metres between the edges from which on an open panel's is told from the frame's.
-    own, unknown
-        Then, where the panel's own is in sight, and where it may not be.
+        Of frames before the wall: value and standard deviation, metres.
     """
 
-    visible: tuple[float, float]
-    hidden: tuple[float, float]
     line: Positive
     unmarked: Fraction
+    least_doubt: Fraction
+    recess: Interval
     proud: tuple[float, float]
-    swung: Positive
-    own: tuple[float, float]
-    unknown: tuple[float, float]
 
 
 class PriorSettings(NamedTuple):

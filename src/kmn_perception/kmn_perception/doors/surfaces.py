@@ -101,6 +101,7 @@ def fit_surfaces(
     blocks: Blocks,
     frame: WallFrame,
     edges: tuple[float, float],
+    outer: tuple[float, float],
     height: HeightSource,
     calibration: Calibration,
     settings: FitSettings,
@@ -109,8 +110,9 @@ def fit_surfaces(
 
     Parameters
     ----------
-    edges
-        Directions of the left and right edge, metres to the right per metre away.
+    edges, outer
+        Directions, metres to the right per metre away, between which the panel is seen, and beyond
+        which the wall is, or its frame.
     height
         How the frame's height above the floor is known.
     calibration
@@ -122,9 +124,11 @@ def fit_surfaces(
     away = np.where(ahead, axes[:, 1], np.inf)
     side = axes[:, 0] / away * frame.distance
     z = axes[:, 2] / away * frame.distance + frame.height
-    left, right = (edge * frame.distance for edge in edges)
+    left, right, frame_left, frame_right = (
+        edge * frame.distance for edge in (*edges, *outer)
+    )
     level = ahead & (z > _LOW) & (z < _HIGH)
-    frame_left, frame_right = left - settings.frame, right + settings.frame
+    frame_left, frame_right = frame_left - settings.frame, frame_right + settings.frame
     beside = (side < frame_left) & (side > frame_left - settings.beside)
     beside |= (side > frame_right) & (side < frame_right + settings.beside)
     inside = (side > left + settings.margin) & (side < right - settings.margin)

@@ -45,6 +45,8 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         covariance=found.covariance,
         handle_side="" if handle is None else handle.side,
         handle_kind="" if handle is None else handle.kind,
+        latch_side=found.latch,
+        hinge_is_known=found.hinge_is_known,
         camera_pose=_camera_pose(frame, 1.0 / found.inverse_height),
         corners=np.array(
             [place(p, z) for z in (float(shape.top), 0.0) for p in (shape.left, shape.right)]
@@ -92,6 +94,12 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
             f"the panel is {1e3 * recess:.0f} mm behind the wall, with a standard deviation of "
             f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
         )
+    low, high = settings.reveal.recess
+    if surfaces.opening != 0.0 and not low - 2.0 * deviation <= recess <= high + 2.0 * deviation:
+        return (
+            f"open by {np.degrees(surfaces.opening):+.0f} deg to the wall, the panel is hinged "
+            f"{recess:.2f} m behind it, expected {low:g} to {high:g} m"
+        )
     low, high = verdict.width
     width, slack = WIDTH + found.values[4], 2.0 * np.sqrt(found.covariance[4, 4])
     if not low - slack <= width <= high + slack:
@@ -109,7 +117,8 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     top, slack = found.shape.top, 2.0 * np.sqrt(found.covariance[3, 3])
     if found.lintel.z is not None and not low - slack <= top <= high + slack:
         return f"the top is at {top:.2f} m, doors are {low:g} to {high:g} m high"
-    if found.lintel.z is None and found.lintel.seen_to > high:
+    surely = min(edge_probability(found.candidate, side) for side in ("left", "right"))
+    if found.lintel.z is None and found.lintel.seen_to > high and surely < verdict.sure:
         return f"no top is seen up to {found.lintel.seen_to:.2f} m"
     return ""
 

@@ -100,9 +100,10 @@ def errors(
 
     def compared(values: NDArray[np.float64]) -> NDArray[np.float64]:
         places = (
-            door_place(door, estimate.handle_side, estimate.camera_pose, model) for door in values
+            door_place(door, estimate.latch_side, estimate.camera_pose, model) for door in values
         )
-        return np.stack([compare(place, label) for place in places])
+        unseen = {} if estimate.handle_side else {"handle": np.full(3, np.nan)}
+        return np.stack([compare(place._replace(**unseen), label) for place in places])
 
     found, covariance = propagate(compared, estimate.values, estimate.covariance)
     stated = np.sqrt(np.diag(covariance))
@@ -111,7 +112,7 @@ def errors(
 
 def door_place(
     values: NDArray[np.float64],
-    handle_side: str,
+    side: str,
     camera_pose: NDArray[np.float64],
     model: RoomModel,
 ) -> DoorPlace:
@@ -119,12 +120,11 @@ def door_place(
 
     Parameters
     ----------
-    handle_side
-        ``left`` or ``right`` as seen; empty: not seen, and taken for the right one.
+    side
+        ``left`` or ``right`` as seen, of latch and handle.
     camera_pose
         (4, 4) optical frame in the world of the parameters.
     """
-    side = handle_side or "right"
     mirror = -1.0 if side == "left" else 1.0
     opening = float(values[DOOR.index("opening")])
     gamma = model.model.split(values[:7])[1]
@@ -147,7 +147,7 @@ def door_place(
         normal=-pose[:3, 0],
         width=WIDTH + float(values[DOOR.index("door_width")]),
         top=HEIGHT + float(values[DOOR.index("door_height")]),
-        handle=handle if handle_side else np.full(3, np.nan),
+        handle=handle,
         opening=float(np.degrees(opening)),
     )
 

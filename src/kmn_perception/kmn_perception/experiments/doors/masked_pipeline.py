@@ -47,7 +47,7 @@ def masked_pipeline(
     values[:7] = np.concatenate([estimate.theta, estimate.gamma])
     if label.handle_side == "left":
         values[1:3] *= -1.0
-    return door_place(values, label.handle_side, pose, model)
+    return door_place(values, label.handle_side or "right", pose, model)
 
 
 def panel_mask(label: DoorLabel, camera: Camera) -> NDArray[np.bool_]:

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from kmn_perception.doors.geometry import DOOR, MEASURED, View2d, door_shape, door_values, propagate
+from kmn_perception.doors.geometry import (
+    DOOR,
+    MEASURED,
+    PROUD,
+    View2d,
+    door_shape,
+    door_values,
+    propagate,
+)
 
 SQUARE = View2d(0.0, 1.0)  # the camera looks straight at the wall
 
@@ -45,7 +53,7 @@ def test_a_closed_flush_door_seen_squarely_has_its_own_numbers() -> None:
     grip = handle_before(left, right, 0.1)
     m = measured(left, right, wall, 1.2, np.array([*grip, 1.05 - 1.2]))
     values = dict(
-        zip(DOOR, door_values(m, handle_left=False, ajar=False, look=SQUARE), strict=True)
+        zip(DOOR, door_values(m, hinge_right=False, ajar=False, look=SQUARE), strict=True)
     )
     assert values["x"] == pytest.approx(2.0 + 0.019)
     assert values["y"] == pytest.approx(0.05)  # to the left: the door's middle is right of us
@@ -83,10 +91,33 @@ def test_the_edge_of_a_frame_hides_the_panels_behind_it() -> None:
     m = measured(np.array([0.3, 2.0]), np.array([1.2, 2.0]), wall, 1.0, np.array([1.1, 2.05, 0.0]))
     m[2:4] = [0.0, 1.0 / (2.0 + recess)]
     m[7:9] = 0.0
-    shape = door_shape(m, handle_left=False, ajar=False)
+    shape = door_shape(m, hinge_right=False, ajar=False)
     np.testing.assert_allclose(shape.left, [0.3, 2.1])
     np.testing.assert_allclose(shape.right, [1.2, 2.1])
     assert shape.recess == pytest.approx(recess)
+
+
+def test_the_frame_tells_how_wide_an_open_panel_is() -> None:
+    """The swung edge is as far from the hinge as the frame's edges are apart."""
+    width, opening, wall = 0.9, 0.4, np.array([0.0, 1.0 / 2.0])
+    hinge = np.array([-0.4, 2.0])
+    swung = hinge + width * np.array([np.cos(opening), np.sin(opening)])
+    m = measured(hinge, swung, wall, 1.2, np.array([0.4, 2.3, 0.0]))
+    m[6], m[8] = (hinge[0] + width) / 2.0, 0.0  # the right line is the frame's edge
+    shape = door_shape(m, hinge_right=False, ajar=True)
+    np.testing.assert_allclose(shape.right, swung)
+    np.testing.assert_allclose(shape.left, hinge)
+
+
+def test_a_frame_that_stands_out_is_nearer_than_its_wall() -> None:
+    proud, recess, wall = 0.03, 0.1, np.array([0.0, 1.0 / 2.0])
+    m = measured(np.array([0.3, 2.0]), np.array([1.2, 2.0]), wall, 1.0, np.array([1.1, 2.05, 0.0]))
+    m[2:4] = [0.0, 1.0 / (2.0 + recess)]
+    m[5:9] = [0.3 / (2.0 - proud), 1.2 / (2.0 - proud), 0.0, 0.0]
+    m[PROUD] = proud
+    shape = door_shape(m, hinge_right=False, ajar=False)
+    np.testing.assert_allclose(shape.left, [0.3, 2.1])
+    np.testing.assert_allclose(shape.right, [1.2, 2.1])
 
 
 def test_a_handle_at_the_left_is_the_mirror_image() -> None:

@@ -34,7 +34,7 @@ SHIPPED = WallTrainingSettings.load("room_door")
 DOORS = DoorSettings.load()
 CELL = (0.04, 0.02)  # metres
 STEADY = SHIPPED.augmentation._replace(
-    mirror=0.0, invert=0.0, depth_alone=0.0, flush=0.0, noise=0.0,
+    mirror=0.0, invert=0.0, depth_alone=0.0, flush=0.0, noise=0.0, stretch=1.0, lift=0,
     weaken=SHIPPED.augmentation.weaken._replace(share=0.0),
 )  # fmt: skip
 
@@ -206,7 +206,7 @@ def marked(columns: int, target: Target) -> Sample:
 @pytest.mark.parametrize("columns", [90, 400])
 def test_windows_and_mirrors_take_the_target_along(mirror: float, columns: int) -> None:
     """A mirrored bright door in a dark wall stays one: its left edge is again a step up."""
-    target = Target(1.0, 20.0, 60.0, 12.0, 37.0, 55.0, 1.0)
+    target = Target(1.0, 20.0, 60.0, 20.0, np.nan, 12.0, 37.0, 55.0, 1.0)
     sample, generator = marked(columns, target), np.random.default_rng(1)
     settings = STEADY._replace(mirror=mirror)
     for _ in range(20):
@@ -215,24 +215,52 @@ def test_windows_and_mirrors_take_the_target_along(mirror: float, columns: int) 
             if 0 <= column < settings.columns:
                 assert cells[0, 3, int(column)] == step
         assert moved.right - moved.left == 40.0
+        shown, hidden = moved.panel_left, moved.panel_right
+        if mirror:
+            shown, hidden = hidden, shown
+        assert shown == (moved.right if mirror else moved.left)
+        assert np.isnan(hidden)
         nearer = moved.right - moved.handle_column
         assert nearer == (5.0 if not mirror else 35.0)
 
 
+def test_stretched_and_lifted_windows_take_the_target_along() -> None:
+    target = Target(1.0, 80.0, 140.0, 80.0, 140.0, 12.0, 37.0, 132.0, 1.0)
+    sample, generator = marked(300, target), np.random.default_rng(2)
+    sample.cells[1, round(target.top)] = SCALE
+    widths, tops = set(), set()
+    for _ in range(20):
+        cells, moved = window(sample, STEADY._replace(stretch=1.2, lift=1), generator)
+        if not (0 <= moved.left and moved.right < STEADY.columns):
+            continue
+        assert abs(int(cells[0, 3].argmax()) - moved.left) <= 1.0
+        assert abs(int(cells[0, 3].argmin()) - moved.right) <= 1.0
+        assert cells[1, int(moved.top), int(moved.left)] == pytest.approx(1.0)
+        assert moved.top - moved.handle_row == target.top - target.handle_row
+        widths.add(round(moved.right - moved.left))
+        tops.add(moved.top)
+    assert min(widths) < 57
+    assert max(widths) > 63
+    assert tops == {11.0, 12.0, 13.0}
+
+
 def test_what_is_outside_of_a_window_is_not_to_be_found_there() -> None:
     spread = SHIPPED.target.spread
-    soft = soft_targets([Target(1.0, -5.0, 20.0, np.nan, 30.0, 80.0, 2.0)], 40, spread)
+    soft = soft_targets(
+        [Target(1.0, -5.0, 20.0, np.nan, 21.0, np.nan, 30.0, 80.0, 2.0)], 40, spread
+    )
     assert soft.edges[0, 0, -1] == 1.0
-    assert int(soft.edges[0, 1].argmax()) == 20
+    assert soft.edges[0, :, :-1].argmax(dim=1).tolist()[1::2] == [20, 21]
+    assert soft.edges[0, 2, -1] == 1.0
     assert soft.top[0, -1] == 1.0
     assert soft.handle_known[0] == 0.0
-    inside = soft_targets([Target(1.0, 2.0, 20.0, 11.0, 30.0, 17.0, 2.0)], 40, spread)
+    inside = soft_targets([Target(1.0, 2.0, 20.0, 2.0, 20.0, 11.0, 30.0, 17.0, 2.0)], 40, spread)
     place = inside.handle[0, :-1].reshape(3, ROWS, 40)
     np.testing.assert_array_equal(np.unravel_index(int(place.argmax()), place.shape), (2, 30, 17))
     for answer in (inside.edges[0, 0], inside.edges[0, 1], inside.top[0], inside.handle[0]):
         assert float(answer.sum()) == pytest.approx(1.0, abs=1e-5)
     missing = soft_targets([Target(0.0)], 40, spread)
-    assert missing.edges[0, :, -1].tolist() == [1.0, 1.0]
+    assert missing.edges[0, :, -1].tolist() == [1.0] * 4
     assert missing.handle[0, -1] == 1.0
 
 
@@ -247,11 +275,21 @@ def test_edges_count_within_4_cm(off: float, right: bool) -> None:
     far = np.zeros(51, np.float32)
     far[40] = 1.0
     scores = Scores(SHIPPED.scores, CELL)
-    target = Target(1.0, 20.0 + off, 40.0 - off, 12.0 + off, 30.0, 22.0 + off, 1.0)
-    scores.add(Proposals(at, far, top, handle), target)
+    target = Target(
+        1.0, 20.0 + off, 40.0 - off, 20.0 + off, np.nan, 12.0 + off, 30.0, 22.0 + off, 1.0
+    )
+    edges = np.stack([at, far, at, far])
+    scores.add(Proposals(edges, top, handle), target)
     share = 1.0 if right else 0.0
     near_top = abs(off) < 1.0
-    assert scores.shares() == {"edges": share, "handle": 1.0, "side": 1.0, "top": float(near_top)}
+    assert scores.shares() == {
+        "edges": share,
+        "handle": 1.0,
+        "no_panel_edges": 0.0,
+        "panel_edges": share,
+        "side": 1.0,
+        "top": float(near_top),
+    }
     other = Scores(SHIPPED.scores, CELL)
-    other.add(Proposals(at, far, top, handle), Target(0.0))
-    assert other.shares() == {"no_edges": 0.0}
+    other.add(Proposals(edges, top, handle), Target(0.0))
+    assert other.shares() == {"no_edges": 0.0, "no_panel_edges": 0.0}

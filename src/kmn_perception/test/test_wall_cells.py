@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cells_of, height_of
 from kmn_perception.doors.wall_view import WallFrame, WallView, view_wall
-from kmn_perception.network.wall_network import KINDS
+from kmn_perception.network.wall_network import EDGES, KINDS
 from kmn_perception.rooms.frame import Frame, make_frame
 from kmn_perception.training.wall.settings import WallTrainingSettings
 from kmn_perception.training.wall.targets import NO_HANDLE, Target, target_of
@@ -88,10 +88,14 @@ def test_a_mirrored_view_has_mirrored_cells_of_the_other_sign() -> None:
     grey = np.asarray(cv2.GaussianBlur(noise, (0, 0), 3.0), dtype=np.float32)
     offset = (grey * NOISE).astype(np.float32)
     there = cells(replace(view, grey=grey, offset=offset))
-    back = cells(replace(view, grey=grey[:, ::-1].copy(), offset=offset[:, ::-1].copy()))
+    mirrored = replace(view, s=-view.s[::-1])
+    back = cells(replace(mirrored, grey=grey[:, ::-1].copy(), offset=offset[:, ::-1].copy()))
     np.testing.assert_allclose(back[DOWN], there[DOWN, :, ::-1], atol=1e-5)
     np.testing.assert_allclose(back[RIGHT], -there[RIGHT, :, ::-1], atol=1e-5)
-    np.testing.assert_allclose(back[OFFSET:], there[OFFSET:, :, ::-1], atol=1e-5)
+    np.testing.assert_allclose(back[OFFSET:-1], there[OFFSET:-1, :, ::-1], atol=1e-5)
+    np.testing.assert_allclose(back[-1], -there[-1, :, ::-1], atol=1e-5)
+    slope = (view.s[-1] - view.s[0]) / view.frame.distance / 2.0  # where 1 is at a tangent of 2
+    assert float(there[-1, 0, -1] - there[-1, 0, 0]) == pytest.approx(slope, rel=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -129,23 +133,25 @@ def test_targets_are_where_the_camera_sees_the_doors_edges(
         if abs(door.nuisance["opening"]) > 0.0:
             continue
         recess = max(door.nuisance["recess"], 0.0)
+        before = door.nuisance["recess"] + door.nuisance["frame_proud"]
         outwards = door.frame[:3, 0] @ camera.pose[:3, :3]  # into the wall
-        for side, column in (("left", target.left), ("right", target.right)):
+        for name in EDGES:
+            column, side = getattr(target, name), name.removeprefix("panel_")
             if np.isnan(column):
                 continue
             edge = (door.corners[f"top_{side}"] + door.corners[f"bottom_{side}"]) / 2.0
-            ends = [camera.matrix @ (edge - part * recess * outwards) for part in (0.0, 1.0)]
-            low, high = sorted(float(end[0] / end[2]) for end in ends)  # panel's and frame's
+            if name == side:  # the frame's
+                edge = edge - before * outwards
+            end = camera.matrix @ edge
             # Up and down the wall a column is a line, which the edge's middle is on.
             s = view.s[0] + (column + 0.375) * WIDE
             up = float(edge @ view.frame.up) + view.frame.height
             at = camera.matrix @ view.frame.points(np.array(s), np.array(up))
             cell = WIDE * camera.fx / at[2]
-            off = float(max(low - at[0] / at[2], at[0] / at[2] - high)) / cell
-            assert off < 0.25
+            assert abs(float(end[0] / end[2] - at[0] / at[2])) / cell < 0.25
             flush += recess < 0.005
             compared += 1
-    assert compared >= 6
+    assert compared >= 12
     assert flush >= 3  # where frame and panel are one
 
 
@@ -188,8 +194,8 @@ def test_a_plane_that_is_not_the_doors_shows_none(doors: list[tuple[Frame, WallV
 
 
 def test_a_mirrored_target_is_that_of_the_mirrored_view() -> None:
-    target = Target(1.0, 10.0, 52.5, 12.0, 36.0, 48.0, 0.0)
+    target = Target(1.0, 10.0, 52.5, 11.0, 51.5, 12.0, 36.0, 48.0, 0.0)
     mirrored = target.mirrored(100)
-    assert mirrored == Target(1.0, 46.5, 89.0, 12.0, 36.0, 51.0, 0.0)
+    assert mirrored == Target(1.0, 46.5, 89.0, 47.5, 88.0, 12.0, 36.0, 51.0, 0.0)
     assert mirrored.mirrored(100) == target
-    assert target.shifted(10.0) == Target(1.0, 0.0, 42.5, 12.0, 36.0, 38.0, 0.0)
+    assert target.shifted(10.0) == Target(1.0, 0.0, 42.5, 1.0, 41.5, 12.0, 36.0, 38.0, 0.0)

@@ -164,9 +164,13 @@ def _in_grey(
     shift = shifts[edges[0] if side == "left" else edges[1]]
     outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
     span = Span(float(view.s[first]), float(view.s[last]), shift, outward)
-    odds = hint.lever_odds if hint is not None and trust is settings.confirmed else 1.0
-    kind, at, along = kind_of(span, odds, settings)
-    return Handle(side, kind, at, z, ratio, other, along, settings.up_noise)
+    seen = hint if trust is settings.confirmed else None
+    kind, at, along = kind_of(span, 1.0 if seen is None else seen.lever_odds, settings)
+    up = settings.up_noise
+    if seen is not None:  # by how much both disagree beyond what the network knows
+        along = np.hypot(along, max(abs(at - seen.s) - settings.hint_noise[0], 0.0))
+        up = np.hypot(up, max(abs(z - seen.z) - settings.hint_noise[1], 0.0))
+    return Handle(side, kind, at, z, ratio, other, float(along), float(up))
 
 
 def _as_hinted(

@@ -124,9 +124,7 @@ def fit_surfaces(
     away = np.where(ahead, axes[:, 1], np.inf)
     side = axes[:, 0] / away * frame.distance
     z = axes[:, 2] / away * frame.distance + frame.height
-    left, right, frame_left, frame_right = (
-        edge * frame.distance for edge in (*edges, *outer)
-    )
+    left, right, frame_left, frame_right = (edge * frame.distance for edge in (*edges, *outer))
     level = ahead & (z > _LOW) & (z < _HIGH)
     frame_left, frame_right = frame_left - settings.frame, frame_right + settings.frame
     beside = (side < frame_left) & (side > frame_left - settings.beside)

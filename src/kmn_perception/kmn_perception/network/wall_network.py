@@ -13,7 +13,9 @@ from torch.nn import functional
 CHANNELS, ROWS = 7, 64  # of a view's cells
 KINDS = ("lever", "knob", "bar")
 EDGES = ("left", "right", "panel_left", "panel_right")  # of the frame, and of the panel in it
-_DILATIONS = (1, 2, 4, 8, 16, 24)
+_FEATURES = (24, 32, 48)  # of columns, ever coarser upwards
+_DILATIONS = 2 * (1, 2, 4, 8, 16, 24)
+_CONTEXT, _JOINED, _GROUPS = 16, 24, 4
 _NO_HANDLE = 3.0  # where the logit of no handle starts
 
 
@@ -44,35 +46,48 @@ class WallNetwork(nn.Module):
     def __init__(self, width: int) -> None:
         super().__init__()
         self.width = width
-        self.first = nn.Conv2d(CHANNELS + 2, 16, 3, stride=(2, 1), padding=1)
-        self.second = nn.Conv2d(16, 24, 3, stride=(2, 1), padding=1)
-        self.third = nn.Conv2d(24, 32, 3, padding=1)
-        self.column = nn.Conv1d(32 * ROWS // 4, width, 1)
-        self.along = nn.ModuleList(
-            nn.Conv1d(width, width, 5, padding=2 * d, dilation=d, groups=4) for d in _DILATIONS
+        a, b, c = _FEATURES
+        self.columns = nn.Sequential(
+            nn.Conv2d(CHANNELS + 2, a, 3, stride=(2, 1), padding=1),
+            nn.GroupNorm(_GROUPS, a),
+            nn.ReLU(),
+            nn.Conv2d(a, b, 3, stride=(2, 1), padding=1),
+            nn.GroupNorm(_GROUPS, b),
+            nn.ReLU(),
+            nn.Conv2d(b, c, 3, padding=1),
+            nn.GroupNorm(_GROUPS, c),
+            nn.ReLU(),
         )
-        self.mix = nn.ModuleList(nn.Conv1d(width, width, 1) for _ in _DILATIONS)
+        self.column = nn.Conv1d(c * ROWS // 4, width, 1)
+        self.along = nn.ModuleList(
+            nn.Sequential(
+                nn.GroupNorm(1, width),
+                nn.Conv1d(width, width, 5, padding=2 * d, dilation=d, groups=_GROUPS),
+                nn.ReLU(),
+                nn.Conv1d(width, width, 1),
+            )
+            for d in _DILATIONS
+        )
         self.edges = nn.Conv1d(width, len(EDGES), 5, padding=2)
         self.none = nn.Linear(width, len(EDGES) + 1)
-        self.context = nn.Conv1d(width, 16, 1)
-        self.joined = nn.Conv2d(48, 32, 3, padding=1)
-        self.top = nn.Conv2d(32, 4, 1)
-        self.handle = nn.Conv2d(32, 4 * len(KINDS), 3, padding=1)
+        self.context = nn.Conv1d(width, _CONTEXT, 1)
+        self.joined = nn.Conv2d(c + _CONTEXT, _JOINED, 3, padding=1)
+        self.top = nn.Conv2d(_JOINED, 4, 1)
+        self.handle = nn.Conv2d(_JOINED, 4 * len(KINDS), 3, padding=1)
 
     def forward(self, cells: Tensor) -> Logits:
         """Read cells (B, CHANNELS, ROWS, N)."""
         count, _, rows, columns = cells.shape
         z = torch.linspace(-1.0, 1.0, rows, device=cells.device)
         z = z.view(1, 1, rows, 1).expand(count, 1, rows, columns)
-        x = functional.relu(self.first(torch.cat([cells, z, z * z], dim=1)))
-        x = functional.relu(self.third(functional.relu(self.second(x))))
+        x = self.columns(torch.cat([cells, z, z * z], dim=1))
         y = functional.relu(self.column(x.reshape(count, -1, columns)))
-        for along, mix in zip(self.along, self.mix, strict=True):
-            y = y + mix(functional.relu(along(y)))
+        for along in self.along:
+            y = y + along(y)
         y = functional.relu(y)
         start = torch.tensor([0.0] * len(EDGES) + [_NO_HANDLE], device=y.device)
         none = self.none(y.amax(dim=2)) + start
-        context = self.context(y)[:, :, None].expand(count, 16, rows // 4, columns)
+        context = self.context(y)[:, :, None].expand(count, _CONTEXT, rows // 4, columns)
         joined = functional.relu(self.joined(torch.cat([x, context], dim=1)))
         return Logits(
             edges=self.edges(y),

@@ -154,7 +154,7 @@ class RoomComparison:
         limit = None
         if truth is not None and observable:
             seen = Frame(depth, grey, frame.room.camera)
-            limit = errors_at_limit(self._best, seen, truth, self.model, self._limits)
+            limit = errors_at_limit(self._best, seen, frame, truth, self.model, self._limits)
         return RoomSample(kind, seed, traits, observable, outcomes, seconds, limit)
 
     def _with_network(self) -> DoorFinder | None:

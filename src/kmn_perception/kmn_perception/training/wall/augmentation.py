@@ -19,8 +19,15 @@ def window(
     sample: Sample, settings: AugmentationSettings, generator: np.random.Generator
 ) -> tuple[NDArray[np.float32], Target]:
     """Return cells (CHANNELS, ROWS, columns) of a changed part of a view, and what they show."""
-    first = _first_column(sample, settings, generator)
-    cells, target = _cut(sample, first, settings.columns), sample.target.shifted(first)
+    stretch = np.exp(generator.uniform(-1.0, 1.0) * np.log(settings.stretch))
+    width = round(settings.columns * stretch)
+    first = _first_column(sample, width, settings, generator)
+    cells, target = _cut(sample, first, width), sample.target.shifted(first)
+    cells = _resized(cells, settings.columns)
+    target = target.stretched(settings.columns / width)
+    lift = int(generator.integers(-settings.lift, settings.lift, endpoint=True))
+    rows = np.clip(np.arange(cells.shape[1]) + lift, 0, cells.shape[1] - 1)
+    cells, target = cells[:, rows], target.lifted(lift)
     if generator.random() < settings.mirror:
         cells, target = cells[:, :, ::-1].copy(), target.mirrored(settings.columns)
         cells[[_RIGHT, _ASIDE]] *= -1.0
@@ -43,10 +50,10 @@ def whole(sample: Sample) -> NDArray[np.float32]:
 
 
 def _first_column(
-    sample: Sample, settings: AugmentationSettings, generator: np.random.Generator
+    sample: Sample, width: int, settings: AugmentationSettings, generator: np.random.Generator
 ) -> int:
     """Draw where a window begins: near a door, or anywhere with half of it in the view at least."""
-    width, available = settings.columns, sample.cells.shape[2]
+    available = sample.cells.shape[2]
     edges = np.array([sample.target.left, sample.target.right])
     known = np.isfinite(edges)
     if sample.target.door and generator.random() < settings.near_door:
@@ -55,6 +62,15 @@ def _first_column(
         return round(middle + (beside - 0.5) * width)
     half = min(width, available) // 2
     return int(generator.integers(half - width, available - half, endpoint=True))
+
+
+def _resized(cells: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
+    """Return cells of so many columns, between which are means."""
+    width = cells.shape[2]
+    at = np.clip((np.arange(columns) + 0.5) * width / columns - 0.5, 0.0, width - 1.0)
+    first = np.minimum(at.astype(np.int64), width - 2)
+    share = (at - first).astype(np.float32)
+    return (1.0 - share) * cells[:, :, first] + share * cells[:, :, first + 1]
 
 
 def _cut(sample: Sample, first: int, width: int) -> NDArray[np.float32]:

@@ -105,6 +105,10 @@ class AugmentationSettings(NamedTuple):
         Largest distance of a window's middle to the door's, of ``columns``.
     noise
         Largest standard deviation of noise that is added to the steps of grey.
+    stretch
+        Largest factor, and divisor, of lengths along the wall.
+    lift
+        Most rows by which heights are wrong.
     """
 
     columns: Annotated[int, Field(ge=16)]
@@ -116,6 +120,8 @@ class AugmentationSettings(NamedTuple):
     depth_alone: Fraction
     flush: Fraction
     noise: NonNegative
+    stretch: Annotated[float, Field(ge=1.0, le=2.0)]
+    lift: Annotated[int, Field(ge=0)]
 
 
 class LossWeights(NamedTuple):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.view_cells import cell_of, height_of
 from kmn_perception.doors.wall_view import WallView
+from kmn_perception.network.wall_network import EDGES as EDGE_NAMES
 from kmn_perception.network.wall_network import KINDS
 from kmn_perception.rooms.design import EDGES, seen_edges, seen_opening, seen_panel_edges
 from kmn_perception.rooms.rendering import Images
@@ -57,6 +58,16 @@ class Target(NamedTuple):
             panel_right=self.panel_right - columns,
             handle_column=self.handle_column - columns,
         )
+
+    def stretched(self, factor: float) -> Target:
+        """Return the target in a view whose cells are as many times narrower."""
+        half = 0.5 * (factor - 1.0)
+        names = (*EDGE_NAMES, "handle_column")
+        return self._replace(**{name: factor * getattr(self, name) + half for name in names})
+
+    def lifted(self, rows: int) -> Target:
+        """Return the target in a view that begins so many rows lower."""
+        return self._replace(top=self.top - rows, handle_row=self.handle_row - rows)
 
     def mirrored(self, columns: int) -> Target:
         """Return the target in the mirrored view of so many columns."""

@@ -231,7 +231,7 @@ def test_stretched_and_lifted_windows_take_the_target_along() -> None:
     widths, tops = set(), set()
     for _ in range(20):
         cells, moved = window(sample, STEADY._replace(stretch=1.2, lift=1), generator)
-        if not (0 <= moved.left and moved.right < STEADY.columns):
+        if moved.left < 0 or moved.right >= STEADY.columns:
             continue
         assert abs(int(cells[0, 3].argmax()) - moved.left) <= 1.0
         assert abs(int(cells[0, 3].argmin()) - moved.right) <= 1.0

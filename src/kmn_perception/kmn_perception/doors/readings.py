@@ -53,7 +53,7 @@ class Plan(NamedTuple):
 
     def behind(self, point: NDArray[np.float64]) -> float:
         """Return how far behind the frame's front a point (2,) is, metres."""
-        return float((self.wall @ point - 1.0) / np.linalg.norm(self.wall)) + self.proud
+        return float((self.wall @ point - 1.0) / np.linalg.norm(self.wall) + self.proud)
 
     def frame_at(self, place: float) -> NDArray[np.float64]:
         """Return the point (2,) of the frame's front at a place along the wall, metres."""
@@ -79,7 +79,7 @@ class Plan(NamedTuple):
     def place_of_frame(self, direction: float) -> float:
         """Return the place along the wall at which the frame is seen in a direction."""
         ray = np.array([direction, 1.0])
-        distance = 1.0 / np.linalg.norm(self.wall) - self.proud
+        distance = float(1.0 / np.linalg.norm(self.wall) - self.proud)
         return float(self.along @ ray) * distance / float(self.away @ ray)
 
     def place_of_panel(self, side: str, direction: float, hinge_place: float) -> float:

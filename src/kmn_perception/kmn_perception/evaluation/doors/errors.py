@@ -99,11 +99,12 @@ def errors(
     """Compare an estimate with a label; deviations follow from its covariance by derivatives."""
 
     def compared(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        places = (
+        places = [
             door_place(door, estimate.latch_side, estimate.camera_pose, model) for door in values
-        )
-        unseen = {} if estimate.handle_side else {"handle": np.full(3, np.nan)}
-        return np.stack([compare(place._replace(**unseen), label) for place in places])
+        ]
+        if not estimate.handle_side:
+            places = [place._replace(handle=np.full(3, np.nan)) for place in places]
+        return np.stack([compare(place, label) for place in places])
 
     found, covariance = propagate(compared, estimate.values, estimate.covariance)
     stated = np.sqrt(np.diag(covariance))

@@ -99,14 +99,15 @@ def _told(
     if view.grey is not None:
         cells = cells_of(view, noise, before)
         count = cells.shape[2]
-        top, handle = np.zeros((ROWS, count)), np.zeros((len(KINDS), ROWS, count))
+        maps = np.array([_map(view, columns.get(name), count) for name in EDGES], np.float32)
+        proposals = Proposals(
+            maps,
+            np.zeros((ROWS, count), np.float32),
+            np.zeros((len(KINDS), ROWS, count), np.float32),
+        )
         if finder.network is not None:
-            _, top, handle = propose(finder.network, cells)
-        maps = np.zeros((len(EDGES), count + 1), np.float32)
-        for name, row in zip(EDGES, maps, strict=True):
-            row[:] = _map(view, columns.get(name), count)
-        proposals = Proposals(maps, top.astype(np.float32), handle.astype(np.float32))
-    return Candidate(0.0, view, pieces, *chosen, lines, np.nan, proposals)
+            proposals = propose(finder.network, cells)._replace(edges=maps)
+    return Candidate(0.0, view, pieces, chosen[0], chosen[1], lines, np.nan, proposals)
 
 
 def _map(view: WallView, column: float | None, count: int) -> NDArray[np.float64]:

@@ -83,7 +83,7 @@ class Target(NamedTuple):
 
 def target_of(view: WallView, room: Room, images: Images, settings: TargetSettings) -> Target:
     """Return what a view of a rendered room shows, as the camera projects it onto the wall."""
-    door, frame = room.door, view.frame
+    door = room.door
     if door is None or not _is_shown(view, door, settings):
         return Target(0.0)
     columns = {}

@@ -168,7 +168,9 @@ def fit(
 ) -> Surfaces:
     frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
     calibration = SETTINGS.calibration._replace(offset=offset)
-    surfaces = fit_surfaces(blocks_of(depth), frame, EDGES, source, calibration, SETTINGS.fit)
+    surfaces = fit_surfaces(
+        blocks_of(depth), frame, EDGES, EDGES, source, calibration, SETTINGS.fit
+    )
     assert surfaces is not None
     return surfaces
 
@@ -213,7 +215,7 @@ def test_what_is_not_measured_has_no_fit() -> None:
     frame = WallFrame.of(wall(0.0, 2.0), UP, HEIGHT)
     settings = replace(SETTINGS.fit)
     found = fit_surfaces(
-        blocks_of(depth), frame, EDGES, HeightSource.SEEN, SETTINGS.calibration, settings
+        blocks_of(depth), frame, EDGES, EDGES, HeightSource.SEEN, SETTINGS.calibration, settings
     )
     assert found is None
 

@@ -10,9 +10,10 @@ import numpy as np
 from kmn_perception.doors.camera_check import doubt_upright
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.layout import SIDES
 from kmn_perception.doors.lines import cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
-from kmn_perception.doors.proposals import with_proposals
+from kmn_perception.doors.proposals import edge_probability, with_proposals
 from kmn_perception.doors.settings import Calibration, DoorSettings
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.verdict import judge
@@ -67,7 +68,7 @@ class DoorFinder:
         best = self._search(frame, walls)
         if best.handle_side and walls.height_source is HeightSource.USUAL:
             # By the handle's usual height the camera is somewhere else above the floor.
-            walls = walls.at_height(float(best.camera_pose[2, 3]), frame, settings)
+            walls = walls.at_height(float(best.camera_pose[2, 3]))
             best = self._search(frame, walls)
         if frame.up is None and best.status is not DoorStatus.NO_DOOR:
             doubt = doubt_upright(best, walls.planes, walls.up, settings)
@@ -77,20 +78,28 @@ class DoorFinder:
     def _search(self, frame: Frame, walls: Walls) -> DoorEstimate:
         """Return the best door of the walls."""
         settings = self.settings
-        candidates = [candidate for view in walls.views for candidate in self._candidates(view)]
-        if not candidates:
-            return DoorEstimate.none(_no_edges(frame))
-        candidates.sort(key=lambda candidate: -candidate.score)
         found: list[DoorEstimate] = []
+        seen = is_sure = False
         bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
-        for candidate in candidates[: settings.candidates]:
-            bar = max((door.score for door in found if door.found), default=-np.inf)
-            if candidate.score + bonus < bar:
-                break  # neither this nor a later one can be as good
-            measurement = measure(frame, walls.blocks, candidate, walls.height_source, settings)
-            if measurement is not None:
-                found.append(judge(measurement, settings))
-        return self._best(found) if found else DoorEstimate.none("no wall beside a panel is seen")
+        for view in walls.views(frame, settings):
+            for candidate in self._candidates(view)[: settings.candidates]:
+                seen = True
+                bar = max((door.score for door in found if door.found), default=-np.inf)
+                if candidate.score + bonus < bar:
+                    break  # neither this nor a later one can be as good
+                measurement = measure(frame, walls.blocks, candidate, walls.height_source, settings)
+                if measurement is not None:
+                    found.append(judge(measurement, settings))
+                    surely = min(edge_probability(measurement.candidate, side) for side in SIDES)
+                    is_sure |= (
+                        found[-1].status is DoorStatus.OK and surely >= settings.network.enough
+                    )
+            if is_sure:
+                break
+        if not found:
+            reason = "no wall beside a panel is seen" if seen else _no_edges(frame)
+            return DoorEstimate.none(reason)
+        return self._best(found)
 
     def _candidates(self, view: WallView) -> list[Candidate]:
         """Return the pairs of upright edges of a wall."""

@@ -196,6 +196,8 @@ class NetworkSettings(NamedTuple):
         Of each edge's probability that are looked at.
     min_peak
         Probability of one at which an edge is believed that shows no line.
+    enough
+        Probability of both edges of an OK door from which on no other wall is looked at.
     min_confidence
         Of a pair of edges that is measured at all.
     snap
@@ -210,6 +212,7 @@ class NetworkSettings(NamedTuple):
 
     peaks: Count
     min_peak: Fraction
+    enough: Fraction
     min_confidence: Fraction
     snap: Positive
     power: Positive

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -67,8 +67,8 @@ class Walls(NamedTuple):
         How it is known.
     blocks, planes
         The frame's inverse depths, and all planes among them.
-    views
-        Of the largest walls, as far as they are in the image.
+    frames
+        Of the largest walls.
     """
 
     up: NDArray[np.float64]
@@ -76,12 +76,19 @@ class Walls(NamedTuple):
     height_source: HeightSource
     blocks: Blocks
     planes: list[Plane]
-    views: list[WallView]
+    frames: list[WallFrame]
 
-    def at_height(self, height: float, frame: Frame, settings: DoorSettings) -> Walls:
+    def views(self, frame: Frame, settings: DoorSettings) -> Iterator[WallView]:
+        """Yield the views of the walls that are in the image, the largest first."""
+        for wall in self.frames:
+            view = view_wall(wall, frame.depth, frame.grey, frame.camera, settings.view)
+            if view is not None:
+                yield view
+
+    def at_height(self, height: float) -> Walls:
         """Return the walls as seen from another height above a floor that is not in view."""
-        frames = [replace(view.frame, height=height) for view in self.views]
-        return self._replace(height=height, views=_views(frames, frame, settings))
+        frames = [replace(wall, height=height) for wall in self.frames]
+        return self._replace(height=height, frames=frames)
 
 
 def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Generator) -> Walls:
@@ -118,14 +125,7 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     elif height is None:
         height, source = settings.prior.handle_height[0], HeightSource.USUAL
     frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
-    views = _views(frames, frame, settings)
-    return Walls(up, height, source, blocks, planes, views)
-
-
-def _views(frames: Sequence[WallFrame], frame: Frame, settings: DoorSettings) -> list[WallView]:
-    """Return the views of walls that are in the image."""
-    views = (view_wall(at, frame.depth, frame.grey, frame.camera, settings.view) for at in frames)
-    return [view for view in views if view is not None]
+    return Walls(up, height, source, blocks, planes, frames)
 
 
 def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:

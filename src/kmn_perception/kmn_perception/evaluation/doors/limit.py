@@ -51,7 +51,7 @@ def errors_at_limit(
     except NoWallError:
         return None
     edges, found = _edges(truth), []
-    for view in walls.views:
+    for view in walls.views(frame, finder.settings):
         told = _told(view, finder, edges)
         if told is None:
             continue

@@ -67,7 +67,7 @@ def _walls(frame: Frame, settings: DoorSettings) -> Iterator[Wall]:
         walls = find_walls(frame, settings, np.random.default_rng(0))
     except NoWallError:
         return
-    for view in walls.views:
+    for view in walls.views(frame, settings):
         before, behind = settings.view.before * noise, settings.view.behind * noise
         yield Wall(view, cut_to_pieces(view, before, behind, settings.lines))
 

@@ -47,12 +47,13 @@ def samples_of(index: int, settings: WallTrainingSettings, doors: DoorSettings) 
     depth = np.nan_to_num(frame.depth).astype(np.float32)
     grey = frame.images.grey.astype(np.float32) / np.float32(255.0)
     try:
-        walls = find_walls(Frame(depth, grey, frame.room.camera), doors, generator)
+        seen = Frame(depth, grey, frame.room.camera)
+        walls = find_walls(seen, doors, generator)
     except NoWallError:
         return []
     noise = doors.fit.pixel_noise
     found = []
-    for view in walls.views:
+    for view in walls.views(seen, doors):
         if view.s[-1] - view.s[0] > data.min_length:
             cells = np.rint(cells_of(view, noise, doors.view.before * noise) * SCALE)
             target = target_of(view, frame.room, frame.images, settings.target)

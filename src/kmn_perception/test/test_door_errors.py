@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate
-from kmn_perception.doors.geometry import View2d, door_shape, door_values
+from kmn_perception.doors.geometry import MEASURED, View2d, door_shape, door_values
 from kmn_perception.evaluation.doors.errors import UNITS, DoorErrors, door_place, errors
 from kmn_perception.evaluation.doors.label import DoorLabel, Known
 
@@ -99,7 +99,9 @@ def test_wrong_is_what_breaks_a_limit_or_a_promise(estimate: DoorEstimate, is_wr
 
 
 def test_a_handle_at_the_other_edge_is_wrong() -> None:
-    mirrored = replace(estimate_of({"y": 0.005, "handle_y": 0.01}), handle_side="left")
+    mirrored = replace(
+        estimate_of({"y": 0.005, "handle_y": 0.01}), handle_side="left", latch_side="left"
+    )
     found = _compare(mirrored)
     assert _named(found.values)["handle_along"] == pytest.approx(-1e3 * 2 * HANDLE[0], abs=1e-6)
     assert found.is_wrong(SETTINGS)
@@ -131,7 +133,7 @@ def test_the_place_of_a_door_is_where_its_parameters_were_measured(side: str, tu
     latch = hinge + 0.9 * along
     corners = (latch, hinge) if side == "left" else (hinge, latch)
     middle, handle = 0.5 * (corners[0] + corners[1]), latch - 0.1 * along
-    m = np.zeros(13)
+    m = np.zeros(len(MEASURED))
     m[0:2], m[2:4] = np.array([0.0, 1.0]) / 1.9, axis / (axis @ hinge)
     m[4] = 1.0 / HEIGHT
     m[5:7] = [p[0] / p[1] for p in corners]

@@ -41,6 +41,8 @@ def door(
         covariance=DEVIATION**2 * np.eye(len(DOOR)),
         handle_side=side,
         handle_kind=kind,
+        latch_side=side or "right",
+        hinge_is_known=bool(side),
         camera_pose=np.eye(4),
         corners=np.zeros((4, 3)),
         handle=np.zeros(3),

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.proposals import peaks_of
 from kmn_perception.doors.readings import EdgeReading, Plan, read_edges
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
@@ -42,16 +44,14 @@ def lay_out(
     Where the panel is seen follows from whose its edges are, and that from where wall and panel
     are: what is found first is found once more if it is elsewhere.
     """
-    view = candidate.view
-    ends = [float(view.s[candidate.edge(side).column]) / view.frame.distance for side in SIDES]
-    spans = np.array([ends, ends])
+    spans = _expected(candidate, settings)
     found = _lay_out(blocks, candidate, spans, height, settings)
     if found is None:
         return None
     of_panel = [found.edges[side].panel_from(side) for side in SIDES]
     of_wall = [found.edges[side].wall_from(side) for side in SIDES]
     better = np.array([of_panel, of_wall])
-    if np.abs(better - spans).max() * view.frame.distance > settings.fit.margin:
+    if np.abs(better - spans).max() * candidate.view.frame.distance > settings.fit.margin:
         return _lay_out(blocks, candidate, better, height, settings) or found
     return found
 
@@ -65,10 +65,26 @@ def read_at(
     return read_edges(candidate, plan, settings)
 
 
+def _expected(candidate: Candidate, settings: DoorSettings) -> NDArray[np.float64]:
+    """Return between which directions the panel, and beyond which the wall, may be seen, (2, 2).
+
+    Beside the candidate's edges a network may see the panel's own.
+    """
+    view, ends = candidate.view, []
+    far = 0.5 * (candidate.right.column - candidate.left.column)
+    for side in SIDES:
+        at = candidate.edge(side).column
+        own = peaks_of(candidate, side, "panel", settings)
+        columns = [at, *(column for column in own[:1] if abs(column - at) < far)]
+        ends.append((float(view.s[min(columns)]), float(view.s[max(columns)])))
+    (left_out, left_in), (right_in, right_out) = ends
+    return np.array([[left_in, right_in], [left_out, right_out]]) / view.frame.distance
+
+
 def _lay_out(
     blocks: Blocks,
     candidate: Candidate,
-    spans: np.ndarray,
+    spans: NDArray[np.float64],
     height: HeightSource,
     settings: DoorSettings,
 ) -> Layout | None:

@@ -27,7 +27,8 @@ def measure_edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tu
         )
     else:
         place, scatter = _subpixel(candidate.view, candidate.pieces, line, settings)
-    return place / distance, float(np.hypot(noise, scatter)) / distance
+    deviation = np.sqrt(noise**2 + scatter**2 + settings.fit.least_edge_noise**2)
+    return place / distance, float(deviation) / distance
 
 
 def _subpixel(

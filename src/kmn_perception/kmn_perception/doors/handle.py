@@ -183,7 +183,8 @@ def _as_hinted(
     if hint is None or hint.probability < settings.sure:
         return None
     side = "left" if abs(hint.s - edges[0]) < abs(hint.s - edges[1]) else "right"
-    if not windows[side].any():
+    low, high = settings.heights
+    if not windows[side].any() or not low <= hint.z <= high:
         return None
     along, up = settings.hint_noise
     if hint.kind == "bar":

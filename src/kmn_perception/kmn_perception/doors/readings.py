@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.lines import Line
-from kmn_perception.doors.proposals import PanelOrFrame, edge_at, none_seen, peaks_of, weight_of
+from kmn_perception.doors.proposals import (
+    PanelOrFrame,
+    doubt_at,
+    edge_at,
+    none_seen,
+    peaks_of,
+    weight_of,
+)
 from kmn_perception.doors.settings import DoorSettings
 
 _OUTWARD = {"left": -1.0, "right": 1.0}
@@ -180,6 +187,9 @@ def _read(
         for reading in readings
         if reading.line != line
     ) / sum(weights.values())
+    for of, reading in own.items():  # where the network sees it elsewhere, or not for sure
+        off = doubt_at(candidate, side, of, line.column, settings)
+        spread += reading.weight / total * off**2
     doubt = max(np.sqrt(share * (1.0 - share)), settings.reveal.least_doubt)
     frame, panel = plan.frame_at(place), plan.panel_at(side, place, hinge_place)
     return EdgeReading(

@@ -202,6 +202,8 @@ class NetworkSettings(NamedTuple):
         Of a pair of edges that is measured at all.
     snap
         Distance within which an edge of the view is the one that is meant, metres.
+    blur
+        Distance within which its probabilities are of one place, metres.
     power
         Of its probability by which lines that may be the same edge are weighed.
     unlikely
@@ -215,6 +217,7 @@ class NetworkSettings(NamedTuple):
     enough: Fraction
     min_confidence: Fraction
     snap: Positive
+    blur: Positive
     power: Positive
     unlikely: Fraction
     step: Positive

@@ -73,6 +73,8 @@ class FitSettings:
         Standard deviation of an edge's direction, pixels.
     step_edge_noise
         And, metres, of one that depth or the network alone tells.
+    least_edge_noise
+        Least deviation of any edge, metres: what is seen is the gap beside it.
     """
 
     pixel_noise: Positive
@@ -93,6 +95,7 @@ class FitSettings:
     min_blocks: Count
     edge_noise: Positive
     step_edge_noise: Positive
+    least_edge_noise: Positive
 
 
 @dataclass(frozen=True)

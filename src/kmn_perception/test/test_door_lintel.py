@@ -9,7 +9,7 @@ import pytest
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.lines import Line
-from kmn_perception.doors.lintel import Lintel, find_lintel
+from kmn_perception.doors.lintel import Lintel, find_lintel, usual_top
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallFrame, WallView
 
@@ -46,3 +46,15 @@ def test_the_top_of_a_clearer_frame_is_not_the_panels(frame: float, panel: float
     """The panel's top ends at its upright edges, the frame's goes on to the frame's own."""
     lintel = lintel_of([(0.0, panel), (frame, 1.0)])
     assert lintel.z == pytest.approx(TOP, abs=0.01)
+
+
+def test_a_top_that_was_not_found_is_above_what_is_seen_or_was_missed() -> None:
+    """Of a half-normal above the mean; and with all missed it is as usual, wherever it is seen."""
+    usual = (2.05, 0.13)
+    value, deviation = usual_top(usual[0], usual, 0.0)
+    assert value == pytest.approx(usual[0] + usual[1] * np.sqrt(2.0 / np.pi), abs=2e-3)
+    assert deviation == pytest.approx(usual[1] * np.sqrt(1.0 - 2.0 / np.pi), abs=2e-3)
+    assert usual_top(2.5, usual, 1.0) == pytest.approx(usual, abs=2e-3)
+    high, wide = usual_top(2.25, usual, 0.1)
+    assert high < 2.2
+    assert wide > deviation

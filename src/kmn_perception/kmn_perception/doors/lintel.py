@@ -76,6 +76,26 @@ def find_lintel(
     return Lintel(float(view.z[best]), float(np.hypot(settings.noise, np.sqrt(spread))), seen_to)
 
 
+def usual_top(seen_to: float, usual: tuple[float, float], missed: float) -> tuple[float, float]:
+    """Return height and standard deviation of a top that was not found, metres.
+
+    Parameters
+    ----------
+    seen_to
+        Up to which it would have been seen.
+    usual
+        Mean and deviation of all tops.
+    missed
+        How likely one that is in view is not found.
+    """
+    mean, deviation = usual
+    grid = mean + deviation * np.linspace(-3.0, 3.0, 200)
+    weights = np.exp(-0.5 * ((grid - mean) / deviation) ** 2)
+    weights[grid < seen_to] *= missed
+    value = float(np.average(grid, weights=weights))
+    return value, float(np.sqrt(np.average((grid - value) ** 2, weights=weights)))
+
+
 def _by_network(
     view: WallView, likely: NDArray[np.float64] | None, settings: LintelSettings
 ) -> tuple[float | None, float]:

@@ -26,7 +26,7 @@ from kmn_perception.doors.geometry import (
 from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.layout import OPPOSITE, SIDES, lay_out, read_at
-from kmn_perception.doors.lintel import Lintel, find_lintel
+from kmn_perception.doors.lintel import Lintel, find_lintel, usual_top
 from kmn_perception.doors.proposals import handle_of
 from kmn_perception.doors.readings import EdgeReading
 from kmn_perception.doors.settings import DoorSettings
@@ -241,7 +241,7 @@ def _gather(
         covariance[4, :] = covariance[:, 4] = 0.0
         covariance[4, 4] = (slack / height**2) ** 2
     if rise is None:
-        top, deviation = _usual_top(lintel, settings)
+        top, deviation = usual_top(lintel.seen_to, settings.prior.height, settings.lintel.missed)
         values[9], deviations[9] = (top - height) / far, deviation / far
     else:
         # Is it the frame's or, of a panel elsewhere, the panel's own?
@@ -250,13 +250,3 @@ def _gather(
         deviations[9] = np.hypot(lintel.deviation / at.distance, apart)
     covariance += np.diag(deviations**2)
     return values, covariance
-
-
-def _usual_top(lintel: Lintel, settings: DoorSettings) -> tuple[float, float]:
-    """Return height and standard deviation of a top that is not seen: above what is, or missed."""
-    mean, deviation = settings.prior.height
-    grid = mean + deviation * np.linspace(-3.0, 3.0, 200)
-    weights = np.exp(-0.5 * ((grid - mean) / deviation) ** 2)
-    weights[grid < lintel.seen_to] *= settings.lintel.missed
-    value = float(np.average(grid, weights=weights))
-    return value, float(np.sqrt(np.average((grid - value) ** 2, weights=weights)))

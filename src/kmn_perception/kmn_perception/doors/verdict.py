@@ -95,10 +95,10 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
             f"{1e3 * deviation:.0f} mm; without edges in an image that is no door"
         )
     low, high = settings.reveal.recess
-    if surfaces.opening != 0.0 and not low - 2.0 * deviation <= recess <= high + 2.0 * deviation:
+    if not low - 2.0 * deviation <= recess <= high + 2.0 * deviation:
+        where = "hinged" if surfaces.opening else "as it stands"
         return (
-            f"open by {np.degrees(surfaces.opening):+.0f} deg to the wall, the panel is hinged "
-            f"{recess:.2f} m behind it, expected {low:g} to {high:g} m"
+            f"the panel is, {where}, {recess:.2f} m behind its wall, expected {low:g} to {high:g} m"
         )
     low, high = verdict.width
     width, slack = WIDTH + found.values[4], 2.0 * np.sqrt(found.covariance[4, 4])

@@ -20,11 +20,11 @@ def measure_edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tu
     """
     distance = candidate.view.frame.distance
     noise = settings.fit.edge_noise * float(candidate.view.footprint[line.column])
-    if line.contrast == 0.0:
-        place, scatter = (
-            float(candidate.view.s[line.column]),
-            3.0 * noise + settings.fit.step_edge_noise,
-        )
+    place = float(candidate.view.s[line.column])
+    if line.contrast == 0.0 and candidate.proposals is not None:
+        scatter = noise + settings.network.deviation
+    elif line.contrast == 0.0:
+        scatter = 3.0 * noise + settings.fit.step_edge_noise
     else:
         place, scatter = _subpixel(candidate.view, candidate.pieces, line, settings)
     deviation = np.sqrt(noise**2 + scatter**2 + settings.fit.least_edge_noise**2)

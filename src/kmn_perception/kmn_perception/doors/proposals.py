@@ -163,11 +163,16 @@ def peaks_of(
     for at in _peaks(found, settings.network.peaks):
         if _near(found, at, 1) < settings.network.min_peak:
             break
-        cells = np.arange(max(at - 1, 0), min(at + 2, len(found) - 1))
-        middle = np.average(cells, weights=found[cells])
-        column = round(float(column_of(candidate.view, middle)))
-        columns.append(min(max(column, 0), len(candidate.view.s) - 1))
+        columns.append(_column(candidate.view, found, at))
     return columns
+
+
+def _column(view: WallView, probabilities: NDArray[np.float32], at: int) -> int:
+    """Return the column of the view in the middle of a peak."""
+    cells = np.arange(max(at - 1, 0), min(at + 2, len(probabilities) - 1))
+    middle = np.average(cells, weights=probabilities[cells])
+    column = round(float(column_of(view, middle)))
+    return min(max(column, 0), len(view.s) - 1)
 
 
 def _pixel(view: WallView) -> float:
@@ -202,8 +207,7 @@ def _edge(
     settings: DoorSettings,
 ) -> Line:
     """Return the edge of the view that is likeliest near a cell, or a place without one."""
-    column = int(round(float(column_of(view, np.array(float(at))))))
-    column = min(max(column, 0), len(view.s) - 1)
+    column = _column(view, probabilities, at)
     reach = settings.network.snap / float(view.s[1] - view.s[0])
     unmarked = Line(column, 1, 0.0, 0.0, float(pieces.step[column]))
     near_by = [line for line in lines if abs(line.column - column) <= reach]

@@ -204,6 +204,8 @@ class NetworkSettings(NamedTuple):
         Distance within which an edge of the view is the one that is meant, metres.
     blur
         Distance within which its probabilities are of one place, metres.
+    deviation
+        Standard deviation of a place that it alone tells, metres.
     power
         Of its probability by which lines that may be the same edge are weighed.
     unlikely
@@ -218,6 +220,7 @@ class NetworkSettings(NamedTuple):
     min_confidence: Fraction
     snap: Positive
     blur: Positive
+    deviation: Positive
     power: Positive
     unlikely: Fraction
     step: Positive

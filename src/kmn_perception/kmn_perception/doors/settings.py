@@ -72,7 +72,7 @@ class FitSettings:
     edge_noise
         Standard deviation of an edge's direction, pixels.
     step_edge_noise
-        And, metres, of one that depth or the network alone tells.
+        And, metres, of one that depth alone tells.
     least_edge_noise
         Least deviation of any edge, metres: what is seen is the gap beside it.
     """

@@ -112,7 +112,7 @@ def fit_surfaces(
     ----------
     edges, outer
         Directions, metres to the right per metre away, between which the panel is seen, and beyond
-        which the wall is, or its frame.
+        which its frame or the wall is.
     height
         How the frame's height above the floor is known.
     calibration
@@ -126,9 +126,8 @@ def fit_surfaces(
     z = axes[:, 2] / away * frame.distance + frame.height
     left, right, frame_left, frame_right = (edge * frame.distance for edge in (*edges, *outer))
     level = ahead & (z > _LOW) & (z < _HIGH)
-    frame_left, frame_right = frame_left - settings.frame, frame_right + settings.frame
-    beside = (side < frame_left) & (side > frame_left - settings.beside)
-    beside |= (side > frame_right) & (side < frame_right + settings.beside)
+    beyond = np.maximum(frame_left - side, side - frame_right) - settings.frame
+    beside = (beyond > 0.0) & (beyond < settings.beside)
     inside = (side > left + settings.margin) & (side < right - settings.margin)
     inside &= level & (z < _PANEL_HIGH)
     offset = inverse - rays @ frame.vector
@@ -157,8 +156,7 @@ def fit_surfaces(
     least, deviations = settings.ajar
     opening = turn if abs(turn) > max(least, deviations * deviation) else 0.0
     if abs(turn) < settings.agree * deviation:
-        closed = settings.closed
-        values, covariance, counts = _solve(surfaces, values, believed, closed, settings)
+        values, covariance, counts = _solve(surfaces, values, believed, settings.closed, settings)
     around = valid & level & beside & (offset < settings.reach)
     unhidden = valid & inside & (offset < settings.reach)
     hidden = valid & inside & (offset >= settings.reach)

@@ -211,18 +211,22 @@ def _lines(
     chosen, view = candidate.edge(side), candidate.view
     pixel = float(view.s[1] - view.s[0])
     yield chosen, ("frame", "panel")
-    taken = [chosen.column]
+    taken = [chosen]
     for line in candidate.lines:
         near = abs(line.column - chosen.column) * pixel <= settings.lines.rivals
         if near and line != chosen and line.coverage >= settings.verdict.min_coverage:
-            taken.append(line.column)
+            taken.append(line)
             yield line, ("frame", "panel")
     # Where frame and panel are alike, the network alone may see an edge.
-    apart = settings.reveal.line / pixel
     for of in ("frame", "panel"):
         for column in peaks_of(candidate, side, of, settings):
-            near = abs(column - chosen.column) * pixel <= settings.lines.rivals
-            if near and all(abs(column - other) > apart for other in taken):
+            least = 0.5 * edge_at(candidate, side, of, column, settings)
+            shown = any(
+                abs(column - line.column) * pixel <= settings.network.snap
+                and edge_at(candidate, side, of, line.column, settings) >= least
+                for line in taken
+            )
+            if not shown and abs(column - chosen.column) * pixel <= settings.lines.rivals:
                 step = float(candidate.pieces.step[column])
                 yield Line(column, 1, 0.0, 0.0, step), (of,)
 

@@ -5,15 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import robotic as ry
+from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.experiments.settings import Experiment, random_recesses
+from kmn_skill.planning.layout import BASE_POSITION
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import pairs
+from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.solver import Solver
 from kmn_skill.planning.surroundings import Obstacle, wall_around
-from kmn_skill.planning.world import World
+from kmn_skill.planning.transfer import transfer
+from kmn_skill.planning.world import World, blunt, boxes
 
 MODEL = KinematicModel.load("door")
 SETUP = PlanningSetup.load(MODEL)
+EXPERIMENT, PROTOTYPES = Experiment.load(), Prototypes.load()
+IN_ROOM = PlanningSetup.load(EXPERIMENT.kinematic_model(in_room=True))
 GAMMA = np.array([-0.2, 0.1, 0.0, 0.0])
 SETTINGS = SETUP.settings.surroundings
 
@@ -44,7 +52,7 @@ def test_any_cuboid_is_an_obstacle_where_the_object_stands() -> None:
     assert frame.getPosition() == pytest.approx(expected[:3])
     collisions = SETUP.settings.policy.obstacle_collisions
     kept = {pair.first for pair in pairs(world) if pair.second == "crate"}
-    assert kept == set(collisions)
+    assert kept == {*collisions, *map(blunt, SETUP.settings.policy.blunt_collisions)}
     assert set(collisions) <= set(SETUP.robot.planning.bodies)
     # The base a hand's breadth beside the crate.
     yaw, place = theta[2], expected[:2]
@@ -55,6 +63,50 @@ def test_any_cuboid_is_an_obstacle_where_the_object_stands() -> None:
     world.configuration.setJointState(state)
     distance = -world.configuration.eval(ry.FS.negDistance, ["base", "crate"])[0][0]
     assert distance == pytest.approx(0.1, abs=0.05)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3, np.pi / 2.0])
+def test_the_deeper_the_base_is_in_a_wall_the_more_it_violates_the_policy(yaw: float) -> None:
+    block = Obstacle("block", np.array([1.0, 0.0, 1.0]), np.array([0.2, 4.0, 2.0]))
+    world, base = World(SETUP, np.zeros(3), GAMMA, [block]), boxes(SETUP.robot)["base"]
+    corners = base.centre[:2] + base.size[:2] / 2.0 * [[-1, -1], [-1, 1], [1, -1], [1, 1]]
+    reach = (corners @ [np.cos(yaw), -np.sin(yaw)]).max()
+    kept = [pair[:2] for pair in pairs(world) if pair.second == "block" and "base" in pair.first]
+
+    def violation(depth: float) -> float:
+        state = np.zeros(13)
+        state[:3] = 0.9 - reach + depth, 0.0, yaw
+        world.configuration.setJointState(state)
+        distances = [-world.configuration.eval(ry.FS.negDistance, pair)[0][0] for pair in kept]
+        return sum(max(SETUP.settings.policy.margin - distance, 0.0) for distance in distances)
+
+    steps = np.diff([violation(depth) for depth in np.linspace(0.0, 0.15, 16)])
+    assert steps.min() > 0.002
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 6])
+def test_a_guess_that_leads_into_the_wall_is_led_out(seed: int) -> None:
+    values = EXPERIMENT.random_doors(in_room=True, count=1, seed=seed)[0]
+    recess = random_recesses("push", 1, seed)[0]
+    request = EXPERIMENT.request(IN_ROOM, values, "push", recess)
+    guess = transfer(next(PROTOTYPES.guesses(request, 1, 0.0)).solution, IN_ROOM.model, request)
+    to_the_right = -IN_ROOM.model.transformation.matrix(request.theta)[:2, 1]
+    opening = guess[-IN_ROOM.settings.planner.coarse :]
+    opening[:, BASE_POSITION] += np.linspace(0.02, 0.1, len(opening))[:, None] * to_the_right
+    solver = Solver(IN_ROOM)
+    world = solver.world(request)
+    assert _nearest(world, opening) < -0.019
+    assert _nearest(world, solver.coarse(world, request, guess)) > 0.0
+
+
+def _nearest(world: World, path: NDArray[np.float64]) -> float:
+    """Return how near base and wall come on a path (T, D), metres."""
+    distances = []
+    for positions in path:
+        world.configuration.setJointState(positions)
+        for name in world.obstacle_names:
+            distances.append(-world.configuration.eval(ry.FS.negDistance, ["base", name])[0][0])
+    return float(min(distances))
 
 
 def _wall(recess: float) -> tuple[Obstacle, ...]:

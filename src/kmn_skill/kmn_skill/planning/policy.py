@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from kmn_skill.planning.layout import BASE_AND_ARM, DOOR, HANDLE, HINGE
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, door_body
+from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, blunt, door_body
 
 COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
 
@@ -143,7 +143,8 @@ def pairs(world: World) -> list[Pair]:
     panel, handle = (door_body(name) for name in world.door_bodies)
     door = [(body, panel) for body in settings.door_collisions]
     door += [(body, handle) for body in settings.handle_collisions]
-    door += [(body, name) for name in world.obstacle_names for body in settings.obstacle_collisions]
+    around = [*settings.obstacle_collisions, *map(blunt, settings.blunt_collisions)]
+    door += [(body, name) for name in world.obstacle_names for body in around]
     own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
     always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*door, *own)]
     before = float(PhaseEnd.PRE_GRASP)

@@ -52,6 +52,8 @@ class PolicySettings(NamedTuple):
         Bodies of the robot that must not touch panel or handle, the last ones before the handle.
     obstacle_collisions
         Bodies of the robot that must not touch what stands around the door.
+    blunt_collisions
+        Bodies that are thick, and must not do so with edges as round as can be either.
     self_collisions
         Bodies of the arm, and those that each of them must not touch.
     """
@@ -65,6 +67,7 @@ class PolicySettings(NamedTuple):
     handle_collisions: Names
     approach_collisions: Names
     obstacle_collisions: Names
+    blunt_collisions: Names
     self_collisions: dict[str, Names]
 
 

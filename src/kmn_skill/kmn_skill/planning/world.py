@@ -34,6 +34,15 @@ def door_body(name: str) -> str:
     return f"door_{name}"
 
 
+def blunt(name: str) -> str:
+    """Return the frame of a robot's body with edges as round as can be.
+
+    The solver's distance is that between boxes without their rounding, and tells no depth where
+    these overlap: only as deep as its rounding can a body be in another one and still be led out.
+    """
+    return f"{name}_blunt"
+
+
 class World:
     """Robot and door m(theta, gamma) in a configuration of the package robotic.
 
@@ -76,6 +85,9 @@ class World:
         self.configuration = ry.Config()
         self.configuration.addFrame("world")
         _add_robot(self.configuration, robot)
+        for name in setup.settings.policy.blunt_collisions:
+            size = boxes(robot)[name].size
+            _add_box(self.configuration, blunt(name), name, np.zeros(3), size, np.inf)
         _add_door(self.configuration, model, theta, gamma)
         for name, centre, size in obstacles:
             _add(self.configuration, name, OBJECT, centre).setShape(ry.ST.box, size)
@@ -212,8 +224,7 @@ def _add_robot(configuration: Any, robot: RobotModel) -> None:
         _add(configuration, f"{name}_origin", carrier.name, offset[:3, 3], offset[:3, :3])
         _add_joint(configuration, frame, robot)
     for name, box in boxes(robot).items():
-        radius = min(robot.planning.rounding, MAX_ROUNDING * box.size.min())
-        _add(configuration, name, box.frame, box.centre).setShape(ry.ST.ssBox, [*box.size, radius])
+        _add_box(configuration, name, box.frame, box.centre, box.size, robot.planning.rounding)
 
 
 def _add_joint(configuration: Any, frame: Any, robot: RobotModel) -> None:
@@ -250,6 +261,19 @@ def _add_door(
         _add(configuration, door_body(body.name), carrier, centre).setShape(
             ry.ST.box, body.size(gamma)
         )
+
+
+def _add_box(
+    configuration: Any,
+    name: str,
+    parent: str,
+    centre: NDArray[np.float64],
+    size: NDArray[np.float64],
+    rounding: float,
+) -> None:
+    """Add a box with rounded edges at a place in a frame; see `MAX_ROUNDING`."""
+    radius = min(rounding, MAX_ROUNDING * size.min())
+    _add(configuration, name, parent, centre).setShape(ry.ST.ssBox, [*size, radius])
 
 
 def _add(

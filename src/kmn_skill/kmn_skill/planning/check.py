@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.planning.clearance import clearance
+from kmn_skill.planning.clearance import REACH, clearance
 from kmn_skill.planning.layout import GRIPPER, HANDLE, HINGE, ROBOT
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Phase, Plan, PlanReport, PlanRequest
@@ -158,13 +158,15 @@ def _clearance(
     around.update({name: own[name] for name in shape.obstacles})
     frames = sorted({box.frame for box in around.values()} | {p.frame for p in parts.values()})
     poses = dict(zip(frames, world.poses(path, frames).transpose(1, 0, 2, 3), strict=True))
-    smallest, names = np.inf, ("", "")
-    for body, part in parts.items():
+    smallest, names = REACH, ("", "")
+    # Small bodies first: they come nearest, and leave less of the large ones to be measured.
+    for body, part in sorted(parts.items(), key=lambda item: item[1].radius):
         for other, box in around.items():
             if other in shape.obstacles and body not in shape.moving:
                 continue
             free = unheld if body in shape.fingers and other in held else slice(None)
-            distance = clearance(part, poses[part.frame][free], box, poses[box.frame][free])
+            part_poses, box_poses = poses[part.frame][free], poses[box.frame][free]
+            distance = clearance(part, part_poses, box, box_poses, reach=smallest)
             if distance < smallest:
                 smallest, names = distance, (body, other)
     return smallest, names

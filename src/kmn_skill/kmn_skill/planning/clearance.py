@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-REACH = 0.15  # metres; what is further away is not measured
+REACH = 0.15  # metres; larger distances are of no interest
 
 
 class Box(NamedTuple):
@@ -39,6 +39,7 @@ def clearance(
     surface_poses: NDArray[np.float64],
     box: Box,
     box_poses: NDArray[np.float64],
+    reach: float = REACH,
 ) -> float:
     """Return the smallest distance between a surface and a box; negative where they overlap.
 
@@ -46,19 +47,21 @@ def clearance(
     ----------
     surface_poses, box_poses
         (N, 4, 4) of their frames at N times.
+    reach
+        Up to which it is of interest, metres: what is further away is not measured.
 
     Returns
     -------
     distance
-        Metres; `REACH` if it is larger.
+        Metres; ``reach`` if it is larger.
     """
     relative = np.linalg.inv(box_poses) @ surface_poses
     centres = relative[:, :3, :3] @ surface.centre + relative[:, :3, 3] - box.centre
-    near = relative[box_distance(centres, box.size) < surface.radius + REACH]
+    near = relative[box_distance(centres, box.size) < surface.radius + reach]
     if not len(near):
-        return REACH
+        return reach
     points = surface.points @ near[:, :3, :3].transpose(0, 2, 1) + near[:, None, :3, 3]
-    return min(REACH, float(box_distance(points - box.centre, box.size).min()))
+    return min(reach, float(box_distance(points - box.centre, box.size).min()))
 
 
 def box_distance(points: NDArray[np.float64], size: NDArray[np.float64]) -> NDArray[np.float64]:

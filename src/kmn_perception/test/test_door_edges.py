@@ -11,7 +11,8 @@ import pytest
 
 from kmn_perception.doors.candidates import Candidate
 from kmn_perception.doors.lines import Line
-from kmn_perception.doors.readings import EdgeReading, Plan, read_edges
+from kmn_perception.doors.plan import Plan
+from kmn_perception.doors.readings import EdgeReading, read_edges
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.view_cells import cell_of
 from kmn_perception.doors.wall_view import WallFrame, WallView

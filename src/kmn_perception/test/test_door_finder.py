@@ -141,6 +141,37 @@ def test_a_handle_beside_the_panel_tells_nothing(monkeypatch: pytest.MonkeyPatch
     assert found.deviation("handle_z") > 0.1
 
 
+def test_a_handle_that_the_network_sees_elsewhere_is_known_less_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    room = sample_room(1, CAMERA, settings(), "door")
+    frame = render(room, 1)
+    found = []
+    for off in (0.0, 0.08):
+
+        def doubted(*given: Any, off: float = off) -> Handle | None:
+            *rest, hint = given
+            return find_handle(*rest, hint._replace(s=hint.s + off, probability=0.9))
+
+        monkeypatch.setattr(measuring, "find_handle", doubted)
+        found.append(finder().find(frame))
+    assert found[0].status is found[1].status is DoorStatus.OK
+    assert found[1].deviation("handle_y") > found[0].deviation("handle_y") + 0.03
+
+
+def test_what_the_network_takes_for_a_handle_near_the_floor_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    room = sample_room(1, CAMERA, settings(handle={"none": 1.0}), "door")
+
+    def low(*given: Any) -> Handle | None:
+        *rest, hint = given
+        return find_handle(*rest, hint._replace(z=0.2, probability=0.99))
+
+    monkeypatch.setattr(measuring, "find_handle", low)
+    assert finder().find(render(room, 1)).handle_side == ""
+
+
 def test_a_door_that_is_flush_is_not_seen_in_depth_alone() -> None:
     for seed in range(3):
         room = sample_room(seed, CAMERA, settings(flush=1.0), "door")

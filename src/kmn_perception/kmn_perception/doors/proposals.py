@@ -130,22 +130,6 @@ def edge_at(
     return min(density / _PEAK, 1.0) + settings.network.unlikely
 
 
-def doubt_at(
-    candidate: Candidate, side: str, of: PanelOrFrame, column: float, settings: DoorSettings
-) -> float:
-    """Return how far a network expects an edge from a column, metres; 0 without a network.
-
-    What it knows to a cell is not counted, and not what is as far as another door.
-    """
-    if candidate.proposals is None:
-        return 0.0
-    view, found = candidate.view, edge_map(candidate.proposals, side, of)[:-1]
-    cell = (column_of(view, np.array(1.0)) - column_of(view, np.array(0.0))) * _pixel(view)
-    off = np.abs(np.arange(len(found)) - cell_of(view, column)) * cell
-    doubted = (off > settings.network.blur) & (off < settings.lines.rivals)
-    return float(np.sqrt((found * off**2)[doubted].sum()))
-
-
 def none_seen(candidate: Candidate, side: str, of: PanelOrFrame) -> float:
     """Return the network's probability that an edge is not seen; 0 without a network."""
     if candidate.proposals is None:
@@ -175,10 +159,6 @@ def _column(view: WallView, probabilities: NDArray[np.float32], at: int) -> int:
     return min(max(column, 0), len(view.s) - 1)
 
 
-def _pixel(view: WallView) -> float:
-    return float(view.s[1] - view.s[0])
-
-
 def _either(proposals: Proposals, side: str, at: int, reach: int) -> float:
     """Return the probability that frame or panel has its edge about a column of cells."""
     return max(_near(edge_map(proposals, side, of), at, reach) for of in ("frame", "panel"))
@@ -194,7 +174,7 @@ def _peaks(probabilities: NDArray[np.float32], count: int) -> list[int]:
     """Return the columns of the largest peaks."""
     p = probabilities[:-1]
     inner = np.pad(p, 1, constant_values=-1.0)
-    peaks = np.flatnonzero((p >= inner[:-2]) & (p > inner[2:]))
+    peaks = np.flatnonzero((p >= inner[:-2]) & (p > inner[2:]) & (p > _LEAST))
     return [int(i) for i in peaks[np.argsort(-p[peaks])][:count]]
 
 

@@ -12,91 +12,19 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kmn_perception.doors.candidates import Candidate
+from kmn_perception.doors.edge_doubt import doubt_of
 from kmn_perception.doors.lines import Line
+from kmn_perception.doors.plan import OUTWARD, Plan
 from kmn_perception.doors.proposals import (
     PanelOrFrame,
-    doubt_at,
     edge_at,
     none_seen,
     peaks_of,
     weight_of,
 )
 from kmn_perception.doors.settings import DoorSettings
-
-_OUTWARD = {"left": -1.0, "right": 1.0}
-
-
-class Plan(NamedTuple):
-    """Wall and panel as seen from above, as lines b x + c y = 1: x to the right, y away.
-
-    Attributes
-    ----------
-    wall, panel
-        (2,) their lines.
-    proud
-        By how much the frame stands out of the wall, metres.
-    hinge
-        ``left`` or ``right`` of an open panel; empty if it is closed.
-    """
-
-    wall: NDArray[np.float64]
-    panel: NDArray[np.float64]
-    proud: float
-    hinge: str
-
-    @property
-    def away(self) -> NDArray[np.float64]:
-        """(2,) the wall's normal, away from the camera."""
-        unit: NDArray[np.float64] = self.wall / np.linalg.norm(self.wall)
-        return unit
-
-    @property
-    def along(self) -> NDArray[np.float64]:
-        """(2,) along the wall, to the right."""
-        return _along(self.wall)
-
-    def behind(self, point: NDArray[np.float64]) -> float:
-        """Return how far behind the frame's front a point (2,) is, metres."""
-        return float((self.wall @ point - 1.0) / np.linalg.norm(self.wall) + self.proud)
-
-    def frame_at(self, place: float) -> NDArray[np.float64]:
-        """Return the point (2,) of the frame's front at a place along the wall, metres."""
-        distance = 1.0 / np.linalg.norm(self.wall) - self.proud
-        point: NDArray[np.float64] = distance * self.away + place * self.along
-        return point
-
-    def panel_at(self, side: str, place: float, hinge_place: float) -> NDArray[np.float64]:
-        """Return the point (2,) of the panel's edge whose frame's edge is at a place.
-
-        Parameters
-        ----------
-        hinge_place
-            The place of the hinged edge of an open panel.
-        """
-        swings = bool(self.hinge) and side != self.hinge
-        foot = self.frame_at(hinge_place if swings else place)
-        point = foot + self.away * (1.0 - self.panel @ foot) / (self.panel @ self.away)
-        if swings:
-            point = point + (place - hinge_place) * _along(self.panel)
-        return np.asarray(point, dtype=np.float64)
-
-    def place_of_frame(self, direction: float) -> float:
-        """Return the place along the wall at which the frame is seen in a direction."""
-        ray = np.array([direction, 1.0])
-        distance = float(1.0 / np.linalg.norm(self.wall) - self.proud)
-        return float(self.along @ ray) * distance / float(self.away @ ray)
-
-    def place_of_panel(self, side: str, direction: float, hinge_place: float) -> float:
-        """Return the place along the wall of an edge whose panel is seen in a direction."""
-        ray = np.array([direction, 1.0])
-        point = ray / float(self.panel @ ray)
-        if not self.hinge or side == self.hinge:
-            return float(self.along @ point)
-        hinge = self.panel_at(self.hinge, hinge_place, hinge_place)
-        return hinge_place + float(_along(self.panel) @ (point - hinge))
 
 
 class EdgeReading(NamedTuple):
@@ -187,9 +115,7 @@ def _read(
         for reading in readings
         if reading.line != line
     ) / sum(weights.values())
-    for of, reading in own.items():  # where the network sees it elsewhere, or not for sure
-        off = doubt_at(candidate, side, of, line.column, settings)
-        spread += reading.weight / total * off**2
+    spread += doubt_of(candidate, side, plan, place, hinge_place, settings) ** 2
     doubt = max(np.sqrt(share * (1.0 - share)), settings.reveal.least_doubt)
     frame, panel = plan.frame_at(place), plan.panel_at(side, place, hinge_place)
     return EdgeReading(
@@ -258,7 +184,7 @@ def _readings(
             continue
         column = (other[0] / other[1] * distance - float(view.s[0])) / pixel
         # What is farther out hides the one that is behind it.
-        outward = _OUTWARD[side] * (column - line.column) * pixel
+        outward = OUTWARD[side] * (column - line.column) * pixel
         apart = abs(outward) > settings.reveal.line
         panel_is_out = outward > 0.0 if of == "frame" else outward < 0.0
         hidden: PanelOrFrame | None = None
@@ -285,9 +211,3 @@ def _is_line(candidate: Candidate, column: float, settings: DoorSettings) -> boo
         abs(line.column - column) <= reach and line.coverage >= settings.verdict.min_coverage
         for line in candidate.lines
     )
-
-
-def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the direction (2,) along a line (b, c), to the right."""
-    b, c = line / np.linalg.norm(line)
-    return np.array([c, -b])

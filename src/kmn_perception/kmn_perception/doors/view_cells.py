@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, overload
 
 import cv2
 import numpy as np
@@ -64,8 +64,12 @@ def column_of(view: WallView, cell: NDArray[np.float64]) -> NDArray[np.float64]:
     return cell * _WIDE + 0.5 * (_WIDE - 1)
 
 
-def cell_of(view: WallView, column: float) -> float:
-    """Return the cell's column of a column of the view."""
+@overload
+def cell_of(view: WallView, column: float) -> float: ...
+@overload
+def cell_of(view: WallView, column: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def cell_of(view: WallView, column: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Return the cells' columns of columns of the view."""
     return (column - 0.5 * (_WIDE - 1)) / _WIDE
 
 

@@ -150,8 +150,9 @@ def test_a_handle_that_the_network_sees_elsewhere_is_known_less_well(
     for off in (0.0, 0.08):
 
         def doubted(*given: Any, off: float = off) -> Handle | None:
-            *rest, hint = given
-            return find_handle(*rest, hint._replace(s=hint.s + off, probability=0.9))
+            return find_handle(
+                *given[:-1], given[-1]._replace(s=given[-1].s + off, probability=0.9)
+            )
 
         monkeypatch.setattr(measuring, "find_handle", doubted)
         found.append(finder().find(frame))
@@ -165,8 +166,7 @@ def test_what_the_network_takes_for_a_handle_near_the_floor_is_none(
     room = sample_room(1, CAMERA, settings(handle={"none": 1.0}), "door")
 
     def low(*given: Any) -> Handle | None:
-        *rest, hint = given
-        return find_handle(*rest, hint._replace(z=0.2, probability=0.99))
+        return find_handle(*given[:-1], given[-1]._replace(z=0.2, probability=0.99))
 
     monkeypatch.setattr(measuring, "find_handle", low)
     assert finder().find(render(room, 1)).handle_side == ""

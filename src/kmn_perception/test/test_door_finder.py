@@ -166,7 +166,7 @@ def test_what_the_network_takes_for_a_handle_near_the_floor_is_none(
     room = sample_room(1, CAMERA, settings(handle={"none": 1.0}), "door")
 
     def low(*given: Any) -> Handle | None:
-        return find_handle(*given[:-1], given[-1]._replace(z=0.2, probability=0.99))
+        return find_handle(*(*given[:-1], given[-1]._replace(z=0.2, probability=0.99)))
 
     monkeypatch.setattr(measuring, "find_handle", low)
     assert finder().find(render(room, 1)).handle_side == ""

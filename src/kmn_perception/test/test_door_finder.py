@@ -150,9 +150,8 @@ def test_a_handle_that_the_network_sees_elsewhere_is_known_less_well(
     for off in (0.0, 0.08):
 
         def doubted(*given: Any, off: float = off) -> Handle | None:
-            return find_handle(
-                *given[:-1], given[-1]._replace(s=given[-1].s + off, probability=0.9)
-            )
+            hint = given[-1]._replace(s=given[-1].s + off, probability=0.9)
+            return find_handle(*(*given[:-1], hint))
 
         monkeypatch.setattr(measuring, "find_handle", doubted)
         found.append(finder().find(frame))

@@ -3,65 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from kmn_perception.doors import measuring
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.door_finder import DoorFinder
-from kmn_perception.doors.handle import Handle, find_handle
 from kmn_perception.doors.walls import Frame
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.depth_sensor import DepthSensor
-from kmn_perception.model.noisy_sensor import NoisySensor
 from kmn_perception.rooms import frame as rooms
-from kmn_perception.rooms.rendering import render_room
 from kmn_perception.rooms.room import Room
 from kmn_perception.rooms.sampling import sample_room
-from kmn_perception.rooms.settings import CameraSettings, RoomSettings
+from kmn_perception.rooms.settings import RoomSettings
 
-CAMERA = Camera.load("d455")
+from .clear_rooms import CAMERA, as_seen, finder, render, settings
+
 DEVIATIONS = 3.5  # within which every value must lie
-
-
-@cache
-def finder() -> DoorFinder:
-    return DoorFinder.load()
-
-
-def settings(**door: Any) -> RoomSettings:
-    """Return clear rooms, with a door as it is said, seen from where it is easy to see."""
-    shipped = RoomSettings.load()
-    where: CameraSettings = shipped.camera._replace(
-        distance=(1.7, 2.3),
-        aside=(-0.5, 0.5),
-        height=(1.1, 1.5),
-        roll=(-0.03, 0.03),
-        both_edges=1.0,
-    )
-    plain: dict[str, Any] = {
-        "closed": 1.0, "frame": 0.0, "flush": 0.0, "handle": {"lever": 1.0},
-        "fitting": {"rosette": 1.0},
-    }  # fmt: skip
-    looks = shipped.looks._replace(alike=0.0, tiles=0.0)
-    return shipped._replace(
-        camera=where, looks=looks, door=shipped.door._replace(**{**plain, **door})
-    )
-
-
-def render(room: Room, seed: int) -> Frame:
-    images = render_room(room, RoomSettings.load().image, np.random.default_rng([seed, 1]))
-    sensor = NoisySensor(DepthSensor.load("d455"), (seed, 3), 0.0)
-    return as_seen(sensor.measure(images.depth, CAMERA.fx), images.grey, room.camera)
-
-
-def as_seen(depth: np.ndarray, grey: np.ndarray, camera: Camera) -> Frame:
-    shade = grey.astype(np.float32) / np.float32(255.0)
-    return Frame(np.nan_to_num(depth).astype(np.float32), shade, camera)
 
 
 def check(found: DoorEstimate, room: Room) -> None:
@@ -118,57 +76,6 @@ def test_what_is_found_lies_within_what_is_stated(condition: str) -> None:
     assert sum(status in seen for status in found) >= 2, found
     if "no handle" in condition:
         assert DoorStatus.OK not in found
-
-
-def test_a_handle_beside_the_panel_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is seen too far from the edge is no handle: its place and its side are not stated."""
-    room = sample_room(1, CAMERA, settings(), "door")
-    frame = render(room, 1)
-    seen = finder().find(frame)
-    assert seen.status is DoorStatus.OK
-
-    def beside(*given: Any) -> Handle | None:
-        handle = find_handle(*given)
-        left, right = given[1]
-        inner = left + 0.35 if handle and handle.side == "left" else right - 0.35
-        return handle and handle._replace(s=inner)
-
-    monkeypatch.setattr(measuring, "find_handle", beside)
-    found = finder().find(frame)
-    assert found.status is not DoorStatus.OK
-    assert found.handle_side == ""
-    assert found.deviation("handle_y") > 0.3
-    assert found.deviation("handle_z") > 0.1
-
-
-def test_a_handle_that_the_network_sees_elsewhere_is_known_less_well(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    room = sample_room(1, CAMERA, settings(), "door")
-    frame = render(room, 1)
-    found = []
-    for off in (0.0, 0.08):
-
-        def doubted(*given: Any, off: float = off) -> Handle | None:
-            hint = given[-1]._replace(s=given[-1].s + off, probability=0.9)
-            return find_handle(*(*given[:-1], hint))
-
-        monkeypatch.setattr(measuring, "find_handle", doubted)
-        found.append(finder().find(frame))
-    assert found[0].status is found[1].status is DoorStatus.OK
-    assert found[1].deviation("handle_y") > found[0].deviation("handle_y") + 0.03
-
-
-def test_what_the_network_takes_for_a_handle_near_the_floor_is_none(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    room = sample_room(1, CAMERA, settings(handle={"none": 1.0}), "door")
-
-    def low(*given: Any) -> Handle | None:
-        return find_handle(*(*given[:-1], given[-1]._replace(z=0.2, probability=0.99)))
-
-    monkeypatch.setattr(measuring, "find_handle", low)
-    assert finder().find(render(room, 1)).handle_side == ""
 
 
 def test_a_door_that_is_flush_is_not_seen_in_depth_alone() -> None:

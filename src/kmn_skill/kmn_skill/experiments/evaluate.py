@@ -15,12 +15,13 @@ from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
+from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import SOURCES, DoorSystem, Room
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.settings import MODES, Experiment, random_recesses
 
-NOISES = ("none", "kinect")
+NOISES = ("none", *SENSORS)
 NAMED = ("mode", "parameters", "noise", "seed", "room")  # options that are kept with the result
 
 

@@ -118,6 +118,11 @@ class DoorFinder:
         if not doors:
             return max(found, key=lambda door: door.score)
         best = max(doors, key=lambda door: (door.status is DoorStatus.OK, door.score))
+        if best.status is not DoorStatus.OK:
+            likeliest = max(found, key=lambda door: door.score)
+            clearly = likeliest.score > best.score + self.settings.verdict.rival
+            if clearly and likeliest.status is DoorStatus.AMBIGUOUS:
+                return likeliest
         for other in doors:
             near = other.score > best.score - self.settings.verdict.rival
             if other is not best and near and other.status is best.status and _overlap(best, other):

@@ -122,6 +122,8 @@ class VerdictSettings:
         Of each edge, by the network where there is one.
     min_confidence
         Probability of both edges, by the network, that makes a door without recess and handle.
+    min_opening
+        Angle to the wall that makes one, radians.
     max_edge_deviation, max_step_deviation
         Of an edge whose place is known, by an image and by depth alone, metres.
     rival
@@ -138,6 +140,7 @@ class VerdictSettings:
     min_visible: Fraction
     min_probability: Fraction
     min_confidence: Fraction
+    min_opening: Positive
     max_edge_deviation: Positive
     max_step_deviation: Positive
     rival: NonNegative

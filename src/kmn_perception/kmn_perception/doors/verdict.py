@@ -145,7 +145,7 @@ def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
         return True
     recess, deviation = found.values[8], np.sqrt(found.covariance[8, 8])
     deep = bool(recess > settings.verdict.min_step * deviation)
-    return found.surfaces.opening != 0.0 or deep
+    return abs(found.surfaces.opening) >= settings.verdict.min_opening or deep
 
 
 def _where(found: Measurement) -> str:

@@ -141,6 +141,13 @@ def test_the_mirror_image_of_a_frame_is_the_mirror_image_of_a_door() -> None:
         assert one.value(name) == pytest.approx(-other.value(name), abs=2.0 * one.deviation(name))
 
 
+def test_a_candidate_whose_panel_would_be_seen_from_its_own_plane_is_left_out() -> None:
+    """It would be hundreds of metres wide, more than can be looked at."""
+    made = rooms.make_frame(910015)
+    estimate = finder().find(as_seen(made.depth, made.images.grey, made.room.camera))
+    assert estimate.status is DoorStatus.OK or estimate.reason
+
+
 @pytest.mark.parametrize("axis", [0, 2])  # pitch and roll
 def test_a_tilt_that_the_image_contradicts_is_refused(axis: int) -> None:
     room = sample_room(1, CAMERA, settings(), "door")

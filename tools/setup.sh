@@ -143,5 +143,5 @@ else
 fi
 if [[ $use == simulation ]]; then
     say "Making the robot's model (5 seconds)"
-    PYTHONPATH=src/kmn_perception:src/kmn_sim "$venv/bin/python" -m kmn_sim.robot.pr2_model
+    PYTHONPATH=src/kmn_perception:src/kmn_sim "$venv/bin/python" -m kmn_sim.robot.robot_model
 fi

@@ -15,7 +15,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import Header
 
-from kmn_msgs.action import OpenDoor
+from kmn_msgs.action import OpenDoor, OperateJoint
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
 
@@ -54,6 +54,7 @@ FIELDS = {
     OpenDoor.Goal: {"handle_angle": "double", "door_angle": "double"},
     OpenDoor.Result: {
         "success": "boolean",
+        "error_code": "int32",
         "reason": "string",
         "handle_angle": "double",
         "door_angle": "double",
@@ -68,6 +69,23 @@ FIELDS = {
         "handle_angle": "double",
         "door_angle": "double",
     },
+    OperateJoint.Goal: {
+        "model": "string",
+        "object_id": "uint32",
+        "joint": "string",
+        "target": "double",
+    },
+    OperateJoint.Result: {
+        "success": "boolean",
+        "error_code": "int32",
+        "reason": "string",
+        "position": "double",
+        "planning_time": "double",
+        "contact_error": "double",
+        "clearance": "double",
+        "attempts": "uint32",
+    },
+    OperateJoint.Feedback: {"phase": "string", "progress": "float", "position": "double"},
 }
 
 uint32 = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
 
-MODELS = ("box_a", "box_b", "box_c", "box", "door")
+MODELS = ("box_a", "box_b", "box_c", "box", "door", "drawer", "cupboard_door", "fridge", "lid")
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -139,3 +139,96 @@ def test_the_stem_joins_lever_and_panel_at_the_axis_of_the_lever() -> None:
     assert centre[2] == pytest.approx(model.joints[1].origin(gamma)[2])
     # The axis lies at the lever's end, beyond which the stem does not stick out.
     assert near[1] == pytest.approx((lever.centre(gamma) - lever.size(gamma) / 2.0)[1])
+
+
+def articulated(tmp_path: Path, **changes: object) -> Path:
+    """Write the drawer's file with some keys changed."""
+    content = yaml.safe_load(resources.find("config/models", "drawer").read_text())
+    file = tmp_path / "drawer.yaml"
+    file.write_text(yaml.safe_dump({**content, **changes}, sort_keys=False))
+    return file
+
+
+def test_a_drawer_slides_with_its_bar() -> None:
+    model = KinematicModel.load("drawer")
+    gamma = np.array([0.1, 0.2, 0.03, 0.05, -0.02])
+    motions = model.motions(gamma, {"slide": -0.25})
+    for body in ("front", "bar"):
+        np.testing.assert_allclose(motions[body][:3, 3], [-0.25, 0.0, 0.0])
+        np.testing.assert_allclose(motions[body][:3, :3], np.eye(3))
+    np.testing.assert_array_equal(motions["cabinet"], np.eye(4))
+
+
+def test_a_lid_lifts_its_bar_about_the_edge_at_the_back() -> None:
+    """A quarter turn brings what was before the hinge above it: (-r, h) becomes (h, r)."""
+    model = KinematicModel.load("lid")
+    gamma = np.array([0.05, 0.1, -0.05])
+    motion = model.motions(gamma, {"hinge": -np.pi / 2.0})["bar"]
+    hinge, bar = model.joint("hinge").origin(gamma), model.body("bar").centre(gamma)
+    before, height = hinge[0] - bar[0], bar[2] - hinge[2]
+    expected = hinge + [height, 0.0, before]
+    np.testing.assert_allclose((motion @ [*bar, 1.0])[:3], expected, atol=1e-12)
+
+
+def test_an_action_says_what_is_grasped_and_moved() -> None:
+    (action,) = KinematicModel.load("door").actions
+    assert [joint.name for joint in action.joints] == ["hinge", "handle"]
+    assert (action.target, action.unlatched) == (-0.9, -0.7)
+    assert action.grasp.thickness(np.zeros(4)) == pytest.approx(0.05)
+    (action,) = KinematicModel.load("drawer").actions
+    assert [joint.name for joint in action.joints] == ["slide"]
+    np.testing.assert_allclose(action.grasp.place(np.zeros(5)), [-0.075, 0.0, 0.7])
+
+
+SLIDE = {"type": "prismatic", "body": "front", "parent": "cabinet", "axis": [1, 0, 0]}
+OPEN = {"joint": "slide", "target": -0.3, "grasp": {"body": "bar", "axis": "z"}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"joints": {"slide": {**SLIDE, "type": "sliding"}}}, "'type' must be one of"),
+        ({"joints": {"slide": SLIDE}}, "key 'limits' is missing"),
+        ({"joints": {"slide": {**SLIDE, "limits": [-1, 0], "origin": [0, 0, 0]}}}, "'origin'"),
+        ({"joints": {"slide": {**SLIDE, "limits": [-1, 0], "axis": [0, 0, 0]}}}, "'axis'"),
+        ({"joints": {"mount": {"type": "fixed", "body": "bar", "parent": "lid"}}}, "'parent'"),
+        (
+            {
+                "joints": {
+                    "mount": {"type": "fixed", "body": "cabinet", "parent": "bar"},
+                    "slide": {**SLIDE, "limits": [-1, 0]},
+                    "hook": {"type": "fixed", "body": "bar", "parent": "front"},
+                }
+            },
+            "mount, slide, hook move each other in a loop",
+        ),
+        (
+            {
+                "joints": {
+                    "slide": {**SLIDE, "limits": [-1, 0]},
+                    "mount": {"type": "fixed", "body": "front", "parent": "cabinet"},
+                }
+            },
+            "as another one does",
+        ),
+        ({"joints": {}}, "needs a joint that moves"),
+        ({"actions": {"open": {**OPEN, "joint": "mount"}}}, "'joint' must be one of slide"),
+        ({"actions": {"open": {**OPEN, "target": -0.6}}}, "'target' must be a number in"),
+        (
+            {"actions": {"open": {**OPEN, "grasp": {"body": "cabinet", "axis": "z"}}}},
+            "is not moved by the joint 'slide'",
+        ),
+    ],
+)
+def test_joints_and_actions_that_cannot_be_are_refused(
+    tmp_path: Path, changes: dict[str, object], named: str
+) -> None:
+    with pytest.raises(ConfigurationError, match=named):
+        KinematicModel.load(articulated(tmp_path, **changes))
+
+
+def test_joints_may_stand_in_any_order(tmp_path: Path) -> None:
+    joints = yaml.safe_load(resources.find("config/models", "drawer").read_text())["joints"]
+    turned = KinematicModel.load(articulated(tmp_path, joints=dict(reversed(joints.items()))))
+    assert [joint.name for joint in turned.joints] == ["slide", "mount"]
+    np.testing.assert_allclose(turned.motions(np.zeros(5), {"slide": -0.2})["bar"][0, 3], -0.2)

@@ -85,7 +85,7 @@ def test_the_depth_image_is_the_block_average_of_the_rendering() -> None:
     model, cloud = observed("door", np.zeros(7))
     image = point_cloud_to_depth(model, cloud, np.eye(4))
     exact = render(model.unit_cubes(np.zeros(3), np.zeros(4)), model.camera)
-    value = (model.input.far - exact) / (model.input.far - model.input.near)
+    value = (model.depth_image.far - exact) / (model.depth_image.far - model.depth_image.near)
     expected = np.nan_to_num(value).reshape(96, 5, 128, 5).mean(axis=(1, 3))
     assert image.shape == (96, 128)
     assert np.abs(image - expected).mean() < 2e-3  # edges, sampled 3 x 3 and 5 x 5 times a pixel

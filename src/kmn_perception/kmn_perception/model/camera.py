@@ -39,8 +39,13 @@ class Camera:
     far: float = 50.0
 
     @classmethod
-    def load(cls, name_or_path: str | Path) -> Camera:
+    def load(cls, name_or_path: str | Path, folder: Path | None = None) -> Camera:
         """Read ``config/cameras/NAME.yaml`` or the user's own file.
+
+        Parameters
+        ----------
+        folder
+            From where a relative path leads; ``None``: from the working directory.
 
         Raises
         ------
@@ -49,7 +54,7 @@ class Camera:
         ConfigurationError
             If a key is missing, unknown or of a wrong value.
         """
-        section = Section.load(resources.find("config/cameras", name_or_path))
+        section = Section.load(resources.find("config/cameras", name_or_path, folder=folder))
         keys = ("name", "width", "height", "fx", "fy", "cx", "cy", "near", "far", "pose")
         section.allow(keys, optional=("colour_distortion",))
         pose = section.section("pose")

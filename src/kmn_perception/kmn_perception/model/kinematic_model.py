@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,12 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_perception.model import model_file
+from kmn_perception.model.actions import Action, read_actions
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.parts import Body, Joint, NetworkInput, Parameter, Stem
+from kmn_perception.model.parts import WORLD, Body, Joint, NetworkInput, Parameter, Stem
 from kmn_perception.model.transformation import Transformation
 
+OPTIONAL = (
+    *("gamma", "joints", "stem", "actions", "start", "symmetry", "input"),
+    *("alternatives", "surroundings"),  # of doors in rooms
+    "mechanics",  # of simulators
+)
 _TURNED = (("rotation", "z"), ("scale", "x"), ("scale", "y"))
 
 
@@ -25,14 +32,22 @@ class KinematicModel:
 
     Attributes
     ----------
+    file
+        From which it was read.
     theta, gamma
         Transformation and configuration parameters; all are 0 at the prototype.
     transformation
         T_theta of the transformation parameters.
     stem
         What joins a body to its parent, if there is such a thing.
+    actions
+        What can be done with it.
+    mechanics
+        What simulators read of its masses, frictions and latches; as it is in the file.
     camera
         The canonical camera, from which the network sees the world.
+    input
+        Depth image of the paper's network; ours needs none.
     start
         Where Algorithm 1 starts: at the ``prototype``, or above the cloud's ``centroid``.
     symmetry
@@ -41,14 +56,17 @@ class KinematicModel:
     """
 
     name: str
+    file: Path
     theta: tuple[Parameter, ...]
     gamma: tuple[Parameter, ...]
     transformation: Transformation
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
     stem: Stem | None
+    actions: tuple[Action, ...]
+    mechanics: Section
     camera: Camera
-    input: NetworkInput
+    input: NetworkInput | None
     start: str
     symmetry: str
 
@@ -64,11 +82,9 @@ class KinematicModel:
             If a key is missing, unknown or wrong, limits are reversed, or a size is not positive
             everywhere within the limits.
         """
-        section = Section.load(resources.find("config/models", name_or_path))
-        section.allow(
-            ("name", "camera", "input", "theta", "bodies"),
-            ("gamma", "joints", "stem", "start", "symmetry", "alternatives", "surroundings"),
-        )
+        file = resources.find("config/models", name_or_path)
+        section = Section.load(file)
+        section.allow(("name", "camera", "theta", "bodies"), OPTIONAL)
         theta = tuple(model_file.read_theta(entry) for entry in section.sections("theta"))
         gamma = tuple(model_file.read_gamma(entry) for entry in section.sections("gamma"))
         names = [parameter.name for parameter in (*theta, *gamma)]
@@ -86,14 +102,17 @@ class KinematicModel:
         joints = model_file.read_joints(section, bodies, gamma)
         model = cls(
             name=section.text("name"),
+            file=file,
             theta=theta,
             gamma=gamma,
             transformation=transformation,
             bodies=bodies,
             joints=joints,
             stem=model_file.read_stem(section, bodies, joints),
-            camera=Camera.load(section.text("camera")),
-            input=model_file.read_input(section.section("input")),
+            actions=read_actions(section, bodies, joints, file.parent),
+            mechanics=section.section("mechanics"),
+            camera=Camera.load(section.text("camera"), file.parent),
+            input=model_file.read_input(section),
             start=section.text("start", ("prototype", "centroid"), "prototype"),
             symmetry=section.text("symmetry", ("none", "quarter_turn"), "none"),
         )
@@ -120,9 +139,38 @@ class KinematicModel:
         """(B, 4, 4) bodies of the prototype, see `unit_cubes`."""
         return self.unit_cubes(*self.split(self.prototype))
 
+    @property
+    def depth_image(self) -> NetworkInput:
+        """``input``; raise ``ConfigurationError`` where the file has none."""
+        if self.input is None:
+            raise ConfigurationError(
+                f"{self.name}: key 'input' is missing: the paper's network sees a depth image"
+            )
+        return self.input
+
     def body(self, name: str) -> Body:
         """Return the body of a name."""
         return next(body for body in self.bodies if body.name == name)
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of a name."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def motions(
+        self, gamma: ArrayLike, positions: Mapping[str, float]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the motion (4, 4) of each body in the object frame by positions of joints.
+
+        Parameters
+        ----------
+        positions
+            By the joints' names, m or rad; 0 of those that are not named.
+        """
+        motions = {name: np.eye(4) for name in (WORLD, *(body.name for body in self.bodies))}
+        for joint in self.joints:
+            moved = joint.motion(gamma, positions.get(joint.name, 0.0))
+            motions[joint.body] = motions[joint.parent] @ moved
+        return motions
 
     def split(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Split (theta, gamma) (..., n + m) into theta (..., n) and gamma (..., m)."""
@@ -147,6 +195,24 @@ class KinematicModel:
             cube[:3, 3] = body.centre(gamma)
             cube[3, 3] = 1.0
         return self.transformation.matrix(theta) @ cubes
+
+    def moved_cubes(
+        self, values: NDArray[np.float64], positions: Mapping[str, float]
+    ) -> NDArray[np.float64]:
+        """Return the bodies as maps (B, 4, 4) of the unit cube to the world, with joints moved.
+
+        Parameters
+        ----------
+        values
+            (n + m,) morphing parameters.
+        positions
+            By the joints' names, m or rad; 0 of those that are not named.
+        """
+        theta, gamma = self.split(values)
+        motions = self.motions(gamma, positions)
+        moved = np.array([motions[body.name] for body in self.bodies])
+        shut = self.unit_cubes(np.zeros_like(theta), gamma)
+        return self.transformation.matrix(theta) @ moved @ shut
 
     def nearest_equivalent(
         self, values: NDArray[np.float64], reference: NDArray[np.float64]

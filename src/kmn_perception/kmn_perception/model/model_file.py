@@ -7,11 +7,28 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kmn_perception.configuration.section import Section, is_number
-from kmn_perception.model.parts import Body, Joint, Linear, NetworkInput, Parameter, Stem
+from kmn_perception.model.parts import (
+    FIXED,
+    JOINT_TYPES,
+    PRISMATIC,
+    REVOLUTE,
+    WORLD,
+    Body,
+    Joint,
+    Linear,
+    NetworkInput,
+    Parameter,
+    Stem,
+)
 from kmn_perception.model.transformation import AXES, KINDS
 
 ROUNDING = 1e-9  # metres
 MIRROR = np.array([1.0, -1.0, 1.0])
+JOINT_KEYS = {  # of each type, the required ones and the others
+    REVOLUTE: (("body", "parent", "axis", "origin", "limits"), ("type",)),
+    PRISMATIC: (("type", "body", "parent", "axis", "limits"), ()),
+    FIXED: (("type", "body", "parent"), ()),
+}
 UNITS = {"translation": "m", "rotation": "rad", "scale": ""}
 
 
@@ -120,23 +137,44 @@ def _smallest(size: Linear, parameters: Sequence[Parameter]) -> tuple[float, tup
 def read_joints(
     section: Section, bodies: Sequence[Body], gamma: Sequence[Parameter]
 ) -> tuple[Joint, ...]:
-    """Read the joints."""
+    """Read the joints, and put each of them after the one that moves its parent."""
     names = [body.name for body in bodies]
-    joints = []
+    joints: list[Joint] = []
     for name in section.section("joints").values:
         joint = section.section("joints").section(name)
-        joint.allow(("body", "parent", "axis", "origin", "limits"))
+        kind = joint.text("type", JOINT_TYPES, REVOLUTE)
+        joint.allow(*JOINT_KEYS[kind])
+        axis = tuple(joint.numbers("axis", 3)) if kind != FIXED else (0.0, 0.0, 0.0)
+        if kind != FIXED and not any(axis):
+            raise joint.error("'axis' must not be 0")
         joints.append(
             Joint(
                 name=name,
+                type=kind,
                 body=joint.text("body", names),
-                parent=joint.text("parent", ("world", *names)),
-                axis=tuple(joint.numbers("axis", 3)),
-                origin=_linear(joint, "origin", gamma),
-                limits=joint.limits("limits"),
+                parent=joint.text("parent", (WORLD, *names)),
+                axis=axis,
+                origin=(
+                    _linear(joint, "origin", gamma)
+                    if kind == REVOLUTE
+                    else Linear(np.zeros(3), np.zeros((3, len(gamma))))
+                ),
+                limits=joint.limits("limits") if kind != FIXED else (0.0, 0.0),
             )
         )
-    return tuple(joints)
+    for number, each in enumerate(joints):
+        if each.body in {before.body for before in joints[:number]}:
+            raise section.error(f"joints: '{each.name}' moves '{each.body}', as another one does")
+    ordered: list[Joint] = []
+    while joints:
+        moved = {joint.body for joint in joints}
+        ready = [joint for joint in joints if joint.parent not in moved]
+        if not ready:
+            names = [joint.name for joint in joints]
+            raise section.error(f"joints: {', '.join(names)} move each other in a loop")
+        ordered += ready
+        joints = [joint for joint in joints if joint.parent in moved]
+    return tuple(ordered)
 
 
 def read_stem(section: Section, bodies: Sequence[Body], joints: Sequence[Joint]) -> Stem | None:
@@ -145,7 +183,7 @@ def read_stem(section: Section, bodies: Sequence[Body], joints: Sequence[Joint])
         return None
     stem = section.section("stem")
     stem.allow(("joint", "thickness"))
-    between = {joint.name: joint for joint in joints if joint.parent != "world"}
+    between = {joint.name: joint for joint in joints if joint.parent != WORLD}
     if not between:
         raise stem.error("a stem needs a joint between two bodies, and there is none")
     joint = between[stem.text("joint", between)]
@@ -154,8 +192,11 @@ def read_stem(section: Section, bodies: Sequence[Body], joints: Sequence[Joint])
     return Stem(joint, by_name[joint.body], by_name[joint.parent], thickness)
 
 
-def read_input(section: Section) -> NetworkInput:
-    """Read the settings of the network's depth image."""
+def read_input(model: Section) -> NetworkInput | None:
+    """Read the settings of the paper's network's depth image, if there are any."""
+    if "input" not in model:
+        return None
+    section = model.section("input")
     section.allow(("width", "height", "near", "far", "contrast", "supersampling", "max_gap"))
     near = section.number("near", 0.0, 1e3)
     return NetworkInput(

@@ -7,6 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kmn_perception.model.rotation import matrix_from_quaternion
+
+REVOLUTE, PRISMATIC, FIXED = JOINT_TYPES = ("revolute", "prismatic", "fixed")
+WORLD = "world"  # parent of what stands still
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -40,14 +45,62 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """A revolute joint in the object frame; ``parent`` is a body or ``world``."""
+    """What lets a body move against its parent, in the object frame at the prototype's state.
+
+    Attributes
+    ----------
+    type
+        One of `JOINT_TYPES`.
+    parent
+        A body, or ``world``.
+    axis
+        (3,) about which a revolute, along which a prismatic joint moves; of any length but 0.
+    origin
+        Of a revolute joint, on its axis.
+    limits
+        Lowest and highest position, rad of a revolute and m of a prismatic joint.
+    """
 
     name: str
+    type: str
     body: str
     parent: str
     axis: tuple[float, ...]
     origin: Linear
     limits: tuple[float, float]
+
+    @property
+    def unit(self) -> str:
+        """Of its position: ``m``, or ``rad``."""
+        return "m" if self.type == PRISMATIC else "rad"
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not fixed."""
+        return self.type != FIXED
+
+    def motion(self, gamma: ArrayLike, position: float) -> NDArray[np.float64]:
+        """Return the motion (4, 4) in the object frame by which a position moves the body.
+
+        Parameters
+        ----------
+        gamma
+            (m,) configuration parameters, on which the joint's place depends.
+        position
+            Radians of a revolute, metres of a prismatic joint.
+        """
+        motion = np.eye(4)
+        if self.type == FIXED:
+            return motion
+        axis = np.array(self.axis)
+        axis = axis / np.linalg.norm(axis)
+        if self.type == PRISMATIC:
+            motion[:3, 3] = position * axis
+            return motion
+        half, origin = position / 2.0, self.origin(gamma)
+        motion[:3, :3] = matrix_from_quaternion([*np.sin(half) * axis, np.cos(half)])
+        motion[:3, 3] = origin - motion[:3, :3] @ origin
+        return motion
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def point_cloud_to_depth(
     depth
         (height, width) values in [0, 1]: 0 is the background, 1 the nearest depth.
     """
-    image, fine = model.input, model.input.supersampling
+    image, fine = model.depth_image, model.depth_image.supersampling
     camera = model.camera.resized(image.width * fine, image.height * fine)
     buffer = splat(camera, points, transform, image.max_gap)
     return _normalise(buffer, fine, image.near, image.far)

@@ -112,7 +112,7 @@ class RoomModel:
         """
         theta, gamma = self.model.split(values)
         mirror = np.diag([1.0, -1.0 if side == "left" else 1.0, 1.0, 1.0])
-        return self.model.transformation.matrix(theta) @ mirror @ self._turn(gamma, opening)
+        return self.model.transformation.matrix(theta) @ mirror @ self.hinge.motion(gamma, opening)
 
     def cubes(
         self,
@@ -168,11 +168,3 @@ class RoomModel:
                     names.append(name)
                     cubes.append(pose @ cube)
         return tuple(names), np.array(cubes)
-
-    def _turn(self, gamma: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-        """Return the rotation (4, 4) about the hinge, which is vertical, in the object frame."""
-        origin, (c, s) = self.hinge.origin(gamma), (np.cos(angle), np.sin(angle))
-        turn = np.eye(4)
-        turn[:2, :2] = [[c, -s], [s, c]]
-        turn[:3, 3] = origin - turn[:3, :3] @ origin
-        return turn

@@ -14,10 +14,17 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 
 def quaternion_from_matrix(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit quaternion (4,) of a rotation matrix (3, 3) (Bar-Itzhack, 2000)."""
-    r = rotation
-    symmetric = np.zeros((4, 4))
-    symmetric[:3, :3] = r + r.T - np.trace(r) * np.eye(3)
-    symmetric[:3, 3] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-    symmetric[3, 3] = np.trace(r)
-    return np.linalg.eigh(symmetric, UPLO="U")[1][:, -1]
+    """Return the unit quaternion (..., 4) of rotation matrices (..., 3, 3) (Bar-Itzhack, 2000)."""
+    r, turned = rotation, np.swapaxes(rotation, -1, -2)
+    trace = np.trace(r, axis1=-2, axis2=-1)[..., None, None]
+    symmetric = np.zeros((*r.shape[:-2], 4, 4))
+    symmetric[..., :3, :3] = r + turned - trace * np.eye(3)
+    symmetric[..., :3, 3] = (turned - r)[..., (1, 2, 0), (2, 0, 1)]
+    symmetric[..., 3, 3] = trace[..., 0, 0]
+    return np.linalg.eigh(symmetric, UPLO="U")[1][..., :, -1]
+
+
+def rotation_about(axis: ArrayLike, angle: float) -> NDArray[np.float64]:
+    """Return the rotation matrix (3, 3) about an axis (3,) of any length above 0, by radians."""
+    direction = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    return matrix_from_quaternion([*(np.sin(angle / 2.0) * direction), np.cos(angle / 2.0)])

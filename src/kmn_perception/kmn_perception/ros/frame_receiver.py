@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
 from kmn_perception.ros.exposures import Exposures, Order
 from kmn_perception.ros.frame_statistics import FrameStatistics
+from kmn_perception.ros.image_transport import transported
 from kmn_perception.ros.mailbox import Mailbox
 from kmn_perception.ros.messages import MessageError, view_from_cloud, view_from_image
+from kmn_perception.ros.messages.compressed import raw_depth
 from kmn_perception.ros.messages.reading import is_distorted
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.reports import ThrottledWarnings
@@ -60,13 +62,16 @@ class FrameReceiver:
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._exposures = Exposures()
         self._sequence: dict[str, int] = {}
-        self._early_image: tuple[Image, float] | None = None  # before any camera_info, and since
+        self._early_image: tuple[Image | CompressedImage, float] | None = (
+            None  # before any camera_info, and since
+        )
         self.camera_info: CameraInfo | None = None
         newest = QoSProfile(depth=1, reliability=reliability)
         # Taken in this order where several came: an image after the camera_info published with it.
         # rclpy calls with the message's info too, of which its annotations know nothing.
         node.create_subscription(CameraInfo, "depth/camera_info", self._on_camera_info, newest)
-        node.create_subscription(Image, "depth/image", self._on_image, newest)  # type: ignore[arg-type]
+        kind, topic = transported(node, "depth/image", settings().depth_image_transport)
+        node.create_subscription(kind, topic, self._on_image, newest)  # type: ignore[arg-type]
         node.create_subscription(PointCloud2, "points", self._on_points, newest)  # type: ignore[arg-type]
 
     def take(self) -> Frame | None:
@@ -81,7 +86,7 @@ class FrameReceiver:
         self._count_lost("points", info)
         self._submit("points", cloud.header, partial(read_cloud, cloud))
 
-    def _on_image(self, image: Image, info: Mapping[str, Any]) -> None:
+    def _on_image(self, image: Image | CompressedImage, info: Mapping[str, Any]) -> None:
         """Submit an image with the newest camera_info, or keep it until the first one comes."""
         self._count_lost("depth/image", info)
         if self.camera_info is not None:
@@ -109,7 +114,7 @@ class FrameReceiver:
         self._statistics.lose(max(0, number - self._sequence.get(topic, number) - 1))
         self._sequence[topic] = number
 
-    def _submit_image(self, image: Image, info: CameraInfo) -> None:
+    def _submit_image(self, image: Image | CompressedImage, info: CameraInfo) -> None:
         if is_distorted(info) and self._settings().rectify:
             self._warnings.warn_once(
                 "rectified",
@@ -145,8 +150,10 @@ def read_cloud(cloud: PointCloud2, settings: MorphNodeSettings) -> DepthView:
     return view_from_cloud(cloud, settings.max_range, settings.world_frame)
 
 
-def _read_image(image: Image, info: CameraInfo, settings: MorphNodeSettings) -> DepthView:
-    return view_from_image(image, info, settings.max_range, settings.rectify)
+def _read_image(
+    image: Image | CompressedImage, info: CameraInfo, settings: MorphNodeSettings
+) -> DepthView:
+    return view_from_image(raw_depth(image), info, settings.max_range, settings.rectify)
 
 
 def _refuse_without_info(settings: MorphNodeSettings) -> DepthView:

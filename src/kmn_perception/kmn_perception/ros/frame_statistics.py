@@ -21,7 +21,7 @@ class FrameStatistics:
         self._received = self._lost = self._dropped = self._superseded = self._clock_jumps = 0
         self._refused: Counter[str] = Counter()
         self._statuses: Counter[str] = Counter()
-        self._used = self._objects = 0
+        self._used = self._objects = self._left_out = 0
         self._latencies: list[float] = []
         self._last = "no frames received yet"
 
@@ -52,7 +52,7 @@ class FrameStatistics:
             self._refused[reason] += 1
             self._last = f"refused, {reason}: {text}"
 
-    def use(self, results: Sequence[tuple[str, str]], latency: float) -> None:
+    def use(self, results: Sequence[tuple[str, str]], latency: float, left_out: int) -> None:
         """Count a frame that was estimated.
 
         Parameters
@@ -61,14 +61,17 @@ class FrameStatistics:
             For each object the name of the estimate's status, and why it is not OK.
         latency
             Seconds from the reception of the frame to its estimate.
+        left_out
+            Number of objects for which its budget did not suffice.
         """
         with self._lock:
             self._used += 1
             self._statuses.update(status for status, _ in results)
             self._objects = sum(status == OK for status, _ in results)
             self._latencies.append(latency)
-            wrong = [f"{status}: {text}" for status, text in results if status != OK]
-            self._last = "; ".join(wrong) or OK
+            self._left_out += left_out
+            wrong = Counter(f"{status}: {text}" for status, text in results if status != OK)
+            self._last = "; ".join(_times(text, count) for text, count in wrong.items()) or OK
 
     def report(self, name: str, period: float) -> DiagnosticStatus:
         """Return the counts and begin a new period.
@@ -90,6 +93,7 @@ class FrameStatistics:
                 "frames_lost": str(self._lost),
                 "frames_used": str(self._used),
                 "objects_last": str(self._objects),
+                "objects_left_out": str(self._left_out),
                 "frames_dropped": str(self._dropped),
                 "frames_superseded": str(self._superseded),
                 "frames_refused": str(self._refused.total()),
@@ -100,3 +104,7 @@ class FrameStatistics:
             }
             message = "no frames" if self._last == OK and not latencies else self._last
         return make_status(name, message != OK, message, values)
+
+
+def _times(text: str, count: int) -> str:
+    return f"{text} ({count} times)" if count > 1 else text

@@ -12,11 +12,14 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from kmn_perception.ros.image_transport import transported
 from kmn_perception.ros.messages import MessageError
+from kmn_perception.ros.messages.compressed import raw_image
 from kmn_perception.ros.messages.grey import grey_in_view
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
+from kmn_perception.ros.overridable_node import overridden
 from kmn_perception.ros.reports import ThrottledWarnings, make_status
 from kmn_perception.ros.stamps import NANOSECONDS
 from kmn_perception.scene.depth_view import DepthView
@@ -27,7 +30,7 @@ MAX_LAG = 10**9  # ns by which a stamp may be behind; beyond it time itself went
 
 class _Stamped(NamedTuple):
     stamp: int
-    image: Image
+    image: Image | CompressedImage
 
 
 class ImageReceiver:
@@ -35,18 +38,24 @@ class ImageReceiver:
 
     Parameters
     ----------
-    node, reliability
-        Who subscribes, and how.
+    node, transport, reliability
+        Who subscribes, to which transport of the image, and how.
     warnings
         Where to tell what is wrong with images.
     """
 
     def __init__(
-        self, node: Node, reliability: ReliabilityPolicy, warnings: ThrottledWarnings
+        self,
+        node: Node,
+        transport: str,
+        reliability: ReliabilityPolicy,
+        warnings: ThrottledWarnings,
     ) -> None:
         self._node, self._warnings = node, warnings
-        self._topics = [node.resolve_topic_name(name) for name in ("image/camera_info", "image")]
-        self._newest = QoSProfile(depth=1, reliability=reliability)
+        self._kind, topic = transported(node, "image", transport)
+        self._topics = [node.resolve_topic_name("image/camera_info"), topic]
+        newest = QoSProfile(depth=1, reliability=reliability)
+        self._profiles = [overridden(node, Subscription, name, newest) for name in self._topics]
         self._subscriptions: list[Subscription] = []
         self._changed = threading.Condition()
         self._images: deque[_Stamped] = deque(maxlen=KEPT)
@@ -59,8 +68,8 @@ class ImageReceiver:
         if wanted and not self._subscriptions:
             subscribe = self._node.create_subscription
             self._subscriptions = [
-                subscribe(CameraInfo, self._topics[0], self._on_info, self._newest),
-                subscribe(Image, self._topics[1], self._on_image, self._newest),
+                subscribe(CameraInfo, self._topics[0], self._on_info, self._profiles[0]),
+                subscribe(self._kind, self._topics[1], self._on_image, self._profiles[1]),
             ]
         elif not wanted:
             for subscription in self._subscriptions:
@@ -108,7 +117,7 @@ class ImageReceiver:
         if info is None and has_info:
             return view, self._miss("without_info", "image/camera_info has not come yet")
         try:
-            intensity = grey_in_view(found.image, info, view, settings.rectify)
+            intensity = grey_in_view(raw_image(found.image), info, view, settings.rectify)
         except MessageError as error:
             self._warnings.warn(error.reason, f"image refused, {error.reason}: {error}")
             return view, self._miss(f"refused_{error.reason}", str(error))
@@ -141,7 +150,7 @@ class ImageReceiver:
             self._last = f"not used: {reason}"
         return f"the image was not used: {reason}"
 
-    def _check_frame(self, image: Image, view: DepthView) -> None:
+    def _check_frame(self, image: Image | CompressedImage, view: DepthView) -> None:
         if image.header.frame_id != view.frame:
             self._warnings.warn_once(
                 "image_frame",
@@ -155,7 +164,7 @@ class ImageReceiver:
             self._info = info
             self._changed.notify_all()
 
-    def _on_image(self, image: Image) -> None:
+    def _on_image(self, image: Image | CompressedImage) -> None:
         stamp = image.header.stamp.sec * NANOSECONDS + image.header.stamp.nanosec
         with self._changed:
             if self._images and stamp < self._images[-1].stamp - MAX_LAG:

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 from std_msgs.msg import Header
@@ -23,16 +22,16 @@ from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.estimator import Estimate, Status
 from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
+from kmn_perception.ros.camera_poses import CameraPoses
+from kmn_perception.ros.frame_estimates import DetectedObject, FrameEstimates
 from kmn_perception.ros.frame_receiver import Frame, FrameReceiver, read_cloud
 from kmn_perception.ros.frame_statistics import FrameStatistics
 from kmn_perception.ros.image_receiver import ImageReceiver
-from kmn_perception.ros.messages import (
-    MessageError,
-    markers_from_estimates,
-    parameters_from_estimate,
-)
+from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.node_program import run_node
+from kmn_perception.ros.object_publisher import ObjectPublisher
+from kmn_perception.ros.overridable_node import OverridableNode
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.pipeline_loading import load_pipeline
 from kmn_perception.ros.reports import (
@@ -49,37 +48,6 @@ QUEUE_DEPTH = 10  # of the publishers
 POSE = {"camera_position", "camera_quaternion"}  # parameters that change as the camera moves
 
 
-class DetectedObject(NamedTuple):
-    """An object's estimate, its number (0 for one alone) and whether the image truncates it."""
-
-    estimate: Estimate
-    number: int
-    truncated: bool
-
-
-class FrameEstimates(NamedTuple):
-    """The objects of a frame, with what their messages need."""
-
-    pipeline: Pipeline
-    header: Header
-    objects: list[DetectedObject]
-
-    def parameters(self) -> list[MorphingParameters]:
-        """Return the message of each object."""
-        return [
-            parameters_from_estimate(
-                self.pipeline.model, found.estimate, self.header, found.number, found.truncated
-            )
-            for found in self.objects
-        ]
-
-    def markers(self) -> MarkerArray:
-        """Return the message that shows all objects."""
-        bodies = self.pipeline.bodies
-        drawn = [(found.estimate, bodies(found.estimate)) for found in self.objects]
-        return markers_from_estimates(self.pipeline.model.name, drawn, self.header)
-
-
 class Active(NamedTuple):
     """What the node works with at present; replaced as a whole when parameters change."""
 
@@ -94,7 +62,7 @@ class Active(NamedTuple):
         return cls(settings, pipeline, FrameFusion(number) if number > 1 else None)
 
 
-class MorphNode(Node):
+class MorphNode(OverridableNode):
     """Estimates the newest frame in a thread of its own; the executor only takes messages.
 
     Thus service, parameters and diagnostics are served however fast the frames come.
@@ -125,8 +93,9 @@ class MorphNode(Node):
             self._statistics,
             self._warnings,
         )
-        self._images = ImageReceiver(self, reliability, self._warnings)
-        self._listen_to_images()
+        self._images = ImageReceiver(self, settings.image_transport, reliability, self._warnings)
+        self._cameras = CameraPoses(self, self._warnings)
+        self._listen()
         self.add_on_set_parameters_callback(self._on_parameters)
         # A daemon, so that an interrupt in this very moment does not leave the process waiting.
         self._worker = threading.Thread(target=self._work, name="estimation", daemon=True)
@@ -136,6 +105,7 @@ class MorphNode(Node):
     def destroy_node(self) -> None:
         """End the estimation thread and the node."""
         self._frames.close()
+        self._cameras.close()
         self._worker.join()
         super().destroy_node()
 
@@ -144,13 +114,15 @@ class MorphNode(Node):
             MorphingParameters, "morphing_parameters", QUEUE_DEPTH
         )
         self._model_publisher = self.create_publisher(MarkerArray, "morphed_model", QUEUE_DEPTH)
+        self._objects = ObjectPublisher(self)
         self.create_service(EstimateMorphing, "estimate_morphing", self._on_estimate)
         report_periodically(self, self._report)
 
-    def _listen_to_images(self) -> None:
-        """Subscribe to images only where they are used: they are large."""
+    def _listen(self) -> None:
+        """Subscribe to images and transforms only where they are used."""
         settings, pipeline, _ = self._active
         self._images.listen(settings.use_image and pipeline.uses_image)
+        self._cameras.configure(settings)
 
     def _on_estimate(
         self, request: EstimateMorphing.Request, response: EstimateMorphing.Response
@@ -170,26 +142,40 @@ class MorphNode(Node):
                 for parameters in answer.parameters():
                     self._parameters_publisher.publish(parameters)
                 self._model_publisher.publish(answer.markers())
+                self._objects.publish(
+                    answer.pipeline.model,
+                    answer.holding(),
+                    answer.header,
+                    self._active.settings.description_change,
+                )
 
     def _answer(self, frame: Frame, all_objects: bool, is_single: bool = False) -> FrameEstimates:
         """Estimate a frame; whatever is wrong with it becomes the reason of the answer.
 
-        A single one waits for no image, and has no past.
+        A single one waits for neither image nor transforms, and has no past.
         """
         settings, pipeline, past = self._active
-        header = Header(stamp=frame.header.stamp, frame_id=settings.world_frame)
+        header = Header(stamp=frame.header.stamp, frame_id=settings.frame)
+
+        def left_of(delay: float) -> float:
+            return 0.0 if is_single else delay - (time.monotonic() - frame.received)
+
         try:
             view = frame.read(settings)
+            if view.in_world:
+                header.frame_id = settings.world_frame
             if not view.in_world:
                 for mistake in self._sensor.look(view, self._frames.camera_info):
                     self._warnings.warn(mistake.key, mistake.text)
-            waited = time.monotonic() - frame.received
-            patience = 0.0 if is_single else settings.image_delay - waited
-            view, lack = self._images.add_to(view, settings, patience)
+            view = self._cameras.add_to(view, settings, left_of(settings.transform_delay))
+            view, lack = self._images.add_to(view, settings, left_of(settings.image_delay))
             number = None if all_objects else 1
             objects = pipeline.estimate_all(view, number, None if is_single else past)
             objects = [_with_lack(found, lack) for found in objects]
             self._sensor.keep_error(objects[0].estimate.sensor_error)
+            seen = objects[0].observation
+            if len(seen.points):
+                self._cameras.tell(view, seen.camera.pose, header)
         except MessageError as error:
             self._refuse(error.reason, str(error))
             return FrameEstimates(pipeline, header, [_none(pipeline, str(error))])
@@ -199,7 +185,7 @@ class MorphNode(Node):
         self._warn_of({found.estimate.status: found.estimate.reason for found in objects})
         latency = time.monotonic() - frame.received
         results = [(found.estimate.status.name, found.estimate.reason) for found in objects]
-        self._statistics.use(results, latency)
+        self._statistics.use(results, latency, sum(found.left_out for found in objects))
         numbers = self._number(objects) if all_objects else [0]
         return FrameEstimates(
             pipeline,
@@ -234,7 +220,8 @@ class MorphNode(Node):
         name = self.get_fully_qualified_name()
         frames = self._statistics.report(f"{name}: frames", REPORT_PERIOD)
         images = self._images.report(f"{name}: image")
-        return [frames, self._sensor.report(f"{name}: sensor"), images]
+        sensor = self._sensor.report(f"{name}: sensor")
+        return [frames, sensor, images, self._cameras.report(f"{name}: transforms")]
 
     def _on_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take over changed parameters together, or refuse them with the reason."""
@@ -249,7 +236,7 @@ class MorphNode(Node):
         self._active = Active.begin(settings, pipeline)
         if {parameter.name for parameter in parameters} <= POSE:
             self._active = Active(settings, pipeline, past)
-        self._listen_to_images()
+        self._listen()
         return SetParametersResult(successful=True)
 
 

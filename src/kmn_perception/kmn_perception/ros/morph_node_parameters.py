@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.rotation import matrix_from_quaternion
-from kmn_perception.pipeline_interface import CalibrationState, PipelineSettings
+from kmn_perception.pipeline_interface import CalibrationState, FrameBudget, PipelineSettings
 from kmn_perception.ros.parameters import pick
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.segmentation import SegmentationSettings
@@ -30,12 +30,20 @@ class MorphNodeSettings:
         As for `MorphEstimator.load`.
     world_frame
         Frame of the parameters; clouds in it need no camera pose.
+    support_frame
+        Frame of the parameters where the camera's pose is that above the support plane.
+    transform_delay
+        How long a frame waits for its transforms, seconds.
     reliability
         Of the subscriptions, ``best_effort`` or ``reliable``.
+    depth_image_transport, image_transport
+        How depth images and the images beside them come, ``raw`` or compressed.
     objects
         Which ones are estimated, ``nearest`` or ``all``.
     object_distance
         By which an object's centre may move between two frames, metres.
+    description_change
+        By which an object may differ from the one that was described, metres.
     max_range
         Coordinates beyond it are not measurements, metres.
     rectify
@@ -53,9 +61,14 @@ class MorphNodeSettings:
     model: str
     weights: str
     world_frame: str
+    support_frame: str
+    transform_delay: float
     reliability: str
+    depth_image_transport: str
+    image_transport: str
     objects: str
     object_distance: float
+    description_change: float
     max_range: float
     rectify: bool
     use_image: bool
@@ -63,6 +76,12 @@ class MorphNodeSettings:
     fused_frames: int
     estimator: EstimatorSettings
     pipeline: PipelineSettings
+
+    @property
+    def frame(self) -> str:
+        """Frame of what is estimated of a frame that is not in the world frame."""
+        above_plane = self.pipeline.camera_pose is CameraPose.SUPPORT_PLANE
+        return self.support_frame if above_plane else self.world_frame
 
     @classmethod
     def check(cls, values: Mapping[str, Any]) -> MorphNodeSettings:
@@ -78,14 +97,23 @@ class MorphNodeSettings:
                 f"'crop_min' must be below 'crop_max' along each axis, found "
                 f"{list(values['crop_min'])} and {list(values['crop_max'])}"
             )
+        if values["support_frame"] == values["world_frame"]:
+            raise ParameterError(
+                f"'support_frame' must differ from 'world_frame', found '{values['world_frame']}'"
+            )
         scene = SceneSettings.load()
         return cls(
             model=values["model"],
             weights=values["weights"],
             world_frame=values["world_frame"],
+            support_frame=values["support_frame"],
+            transform_delay=values["transform_delay"],
             reliability=values["reliability"],
+            depth_image_transport=values["depth_image_transport"],
+            image_transport=values["image_transport"],
             objects=values["objects"],
             object_distance=values["object_distance"],
+            description_change=values["description_change"],
             max_range=values["max_range"],
             rectify=values["rectify"],
             use_image=values["use_image"],
@@ -104,6 +132,7 @@ class MorphNodeSettings:
                 background=pick(SegmentationSettings, values),
                 scene=scene,
                 calibration=CalibrationState(values["calibration"]),
+                budget=FrameBudget(values["max_objects"], values["max_time"]),
             ),
         )
 

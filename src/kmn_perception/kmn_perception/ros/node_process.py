@@ -39,9 +39,18 @@ class NodeProcess:
         self._command = [sys.executable, "-m", package, executable, "--ros-args", *arguments]
 
     def __enter__(self) -> NodeProcess:
-        with self._log.open("wb") as output:
-            self._process = subprocess.Popen(self._command, stdout=output, stderr=output)
+        self.start()
         return self
+
+    def start(self) -> None:
+        """Start it, also once more after it was killed."""
+        with self._log.open("ab") as output:
+            self._process = subprocess.Popen(self._command, stdout=output, stderr=output)
+
+    def kill(self) -> None:
+        """End it without a chance to tidy up, as ``kill -9``."""
+        self._process.kill()
+        self._process.wait()
 
     def __exit__(self, *exception: object) -> None:
         self._process.send_signal(signal.SIGINT)
@@ -108,6 +117,13 @@ class ProcessClient:
         result = future.result().result
         if not result.successful:
             raise ProcessError(f"{service.srv_name} refused {dict(values)}: {result.reason}")
+
+
+def namespace_arguments(namespace: str) -> list[str]:
+    """Return the ROS arguments of a node in a namespace, with a clock and transforms of its own."""
+    remaps = [f"__ns:={namespace}"]
+    remaps += [f"{topic}:={namespace}{topic}" for topic in ("/clock", "/tf", "/tf_static")]
+    return [text for remap in remaps for text in ("-r", remap)]
 
 
 def parameter_arguments(values: Mapping[str, Any]) -> list[str]:

@@ -19,6 +19,7 @@ from rclpy.task import Future
 
 from kmn_perception.configuration.node_parameters import describe_parameters
 from kmn_perception.ros.parameter_files import useless_files
+from kmn_perception.ros.parameters import foreign_parameters
 from kmn_perception.ros.program import ros_session, split_arguments
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -59,7 +60,8 @@ def run_node(
     with ros_session(name):
         stop = _Stop()
         node = make_node()
-        for text in useless_files(node.get_fully_qualified_name(), ros):
+        useless = useless_files(node.get_fully_qualified_name(), ros)
+        for text in [*foreign_parameters(node), *useless]:
             node.get_logger().warning(text)
         stop.in_order = True
         _serve(node, stop, say_last_words)

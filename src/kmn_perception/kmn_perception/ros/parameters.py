@@ -23,7 +23,7 @@ Settings = TypeVar("Settings")
 
 
 def declare_parameters(node: Node, stated: str) -> dict[str, Any]:
-    """Declare parameters as they are stated, and return their values; warn of foreign ones.
+    """Declare parameters as they are stated, and return their values.
 
     Parameters
     ----------
@@ -42,8 +42,6 @@ def declare_parameters(node: Node, stated: str) -> dict[str, Any]:
             for name, parameter in load_node_parameters(stated).items()
         ],
     )
-    for text in foreign_parameters(node):
-        node.get_logger().warning(text)
     return read_parameters(node, stated)
 
 

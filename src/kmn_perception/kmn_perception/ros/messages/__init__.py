@@ -17,6 +17,7 @@ from kmn_perception.ros.messages.results import (
     markers_from_estimates,
     parameters_from_estimate,
 )
+from kmn_perception.ros.messages.transforms import transform_message
 from kmn_perception.ros.messages.writing import (
     cloud_from_points,
     image_from_depth,
@@ -34,6 +35,7 @@ __all__ = [
     "markers_from_estimates",
     "parameters_from_estimate",
     "points_from_cloud",
+    "transform_message",
     "view_from_cloud",
     "view_from_image",
 ]

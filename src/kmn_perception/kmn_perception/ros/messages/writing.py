@@ -43,15 +43,20 @@ def image_from_depth(depth: NDArray[np.float32], encoding: str, header: Header) 
         with np.errstate(invalid="ignore"):
             pixels = np.rint(depth * np.float32(MM_PER_M))
             pixels = np.where((pixels > 0) & (pixels <= np.iinfo(np.uint16).max), pixels, 0)
-    data = pixels.astype(f"<{DEPTH_TYPES[encoding]}", copy=False)
-    height, width = depth.shape
+    return image_from_pixels(pixels.astype(DEPTH_TYPES[encoding], copy=False), encoding, header)
+
+
+def image_from_pixels(pixels: NDArray[np.generic], encoding: str, header: Header) -> Image:
+    """Make an image of pixels (height, width) or (height, width, channels) of the encoding."""
+    data = pixels.astype(pixels.dtype.newbyteorder("<"), copy=False)
+    height, width = pixels.shape[:2]
     return Image(
         header=header,
         height=height,
         width=width,
         encoding=encoding,
         is_bigendian=0,
-        step=width * data.itemsize,
+        step=data.nbytes // height,
         data=_bytes(data),
     )
 

@@ -160,6 +160,21 @@ def test_a_tilt_that_the_image_contradicts_is_refused(axis: int) -> None:
     assert "vertical lines in the image are tilted by" in refused.reason
 
 
+@pytest.mark.parametrize("turn", [-0.0175, 0.0175])
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_camera_that_is_pitched_by_a_degree_on_its_mount_sees_the_door_at_its_height(
+    turn: float, seed: int
+) -> None:
+    """At the door's distance the pose that is given has it centimetres too high or too low."""
+    room = sample_room(seed, CAMERA, settings(), "door")
+    up, height = room.camera.pose[2, :3], float(room.camera.pose[2, 3])
+    frame = render(room, seed)._replace(height=height)
+    right = finder().find(frame._replace(up=up))
+    found = finder().find(frame._replace(up=cv2.Rodrigues(turn * np.eye(3)[0])[0] @ up))
+    assert right.found and found.found
+    assert abs(found.value("door_height") - right.value("door_height")) < 0.008
+
+
 def test_a_height_that_the_floor_contradicts_is_refused() -> None:
     room = sample_room(1, CAMERA, settings(), "door")
     frame = render(room, 1)._replace(up=room.camera.pose[2, :3])

@@ -100,6 +100,25 @@ def test_vertical_segments_tell_the_vertical_where_walls_are_wrong() -> None:
     assert error[1] < 0.3 < error[0]
 
 
+@pytest.mark.parametrize("tilt", [0.0, 0.017, -0.017])
+def test_a_vertical_that_is_given_a_degree_askew_is_put_right_by_vertical_segments(
+    tilt: float,
+) -> None:
+    """Lines that lean by 5 degrees are none of them; without segments the given one is kept."""
+    generator = np.random.default_rng(2)
+    beside = np.cross(UP, generator.normal(size=(20, 3)))
+    leaning = np.cross(UP + [0.09, 0.0, 0.0], generator.normal(size=(5, 3)))
+    normals = np.concatenate([beside, leaning])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    given = UP + [0.0, 0.0, tilt]
+    given /= np.linalg.norm(given)
+    segments = normals, np.full(25, 0.003)
+    up = find_up([], segments, SETTINGS.vertical, given, is_given=True)
+    assert np.degrees(np.arccos(min(up @ UP, 1.0))) < 0.2
+    kept = find_up([], None, SETTINGS.vertical, given, is_given=True)
+    np.testing.assert_allclose(kept, given, atol=1e-9)
+
+
 def camera_height(depth: np.ndarray, level: np.ndarray | None = None) -> SeenHeight | None:
     rays, inverse, valid = blocks_of(depth).flat()
     settings = SETTINGS.floor

@@ -31,7 +31,8 @@ class DoorEstimate:
     values, covariance
         (9,) and (9, 9) parameters of the door, see `DOOR`; NaN where there is none.
     handle_side, handle_kind
-        ``left`` or ``right`` as seen; ``lever`` or ``knob``; empty where it is not seen.
+        ``left`` or ``right`` as seen; ``lever``, ``knob`` or ``bar``; empty where it is not seen,
+        or not known.
     latch_side, hinge_is_known
         Side at which the parameters take the latch to be, and whether handle or opening tell it.
     camera_pose

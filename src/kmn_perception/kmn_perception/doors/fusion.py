@@ -137,13 +137,13 @@ def agree(a: DoorEstimate, b: DoorEstimate, deviations: float) -> bool:
 
 
 def fuse(estimates: Sequence[DoorEstimate], settings: FusionSettings) -> DoorEstimate:
-    """Return the mean of estimates that agree; where enough saw the handle, of those that did.
+    """Return the mean of estimates that agree; where enough know the handle, of those that do.
 
     Points in the optical frame, and what else does not enter the mean, are those of the newest.
     """
-    seen = [one for one in estimates if one.handle_side]
+    seen = [one for one in estimates if one.handle_kind]
     is_seen = len(seen) >= max(settings.handle * len(estimates), 1.0)
-    used = seen if is_seen else [one for one in estimates if not one.handle_side]
+    used = seen if is_seen else [one for one in estimates if not one.handle_kind]
     used = [one for one in used if one.latch_side == used[-1].latch_side]
     newest, n = used[-1], len(used)
     values = np.array([one.values for one in used])

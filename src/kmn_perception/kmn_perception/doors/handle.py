@@ -9,15 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.handle_kind import Span, kind_of
+from kmn_perception.doors.handle_kind import kind_of
 from kmn_perception.doors.part_settings import HandleSettings
 from kmn_perception.doors.wall_view import WallFrame, WallView, resample
 from kmn_perception.model.camera import Camera
 
 _FLOOR_OF_NOISE = 0.005  # of the logarithm of grey
 _PIXEL = 0.005  # metres
-_JOINED = 3  # pixels of a handle that may look like the panel
-_REACH = 0.12  # metres to either side of the peak that a handle may reach
 
 
 class Hint(NamedTuple):
@@ -48,7 +46,9 @@ class Handle(NamedTuple):
     side
         ``left`` or ``right``, as seen.
     kind
-        ``lever``, ``knob`` or ``bar``.
+        ``lever``, ``knob`` or ``bar``; empty where a lever and a knob are nearly as likely.
+    odds
+        How much likelier than the other a lever or a knob is.
     s, z
         Where the ray through its middle meets the panel: metres to the right of the camera along
         the panel, and above the floor.
@@ -62,6 +62,7 @@ class Handle(NamedTuple):
 
     side: str
     kind: str
+    odds: float
     s: float
     z: float
     ratio: float
@@ -115,7 +116,7 @@ def find_handle(
     windows = {side: window & (side in sides) for side, window in windows.items()}
     level = (z > low) & (z < high)
     if grey is not None:
-        return _in_grey(view, windows, middle, level, edges, shifts, settings, hint)
+        return _in_grey(view, windows, middle, level, edges, settings, hint)
     return _in_depth(view, windows, level, settings, step_noise)
 
 
@@ -125,7 +126,6 @@ def _in_grey(
     middle: NDArray[np.bool_],
     level: NDArray[np.bool_],
     edges: tuple[float, float],
-    shifts: dict[float, float],
     settings: HandleSettings,
     hint: Hint | None,
 ) -> Handle | None:
@@ -156,21 +156,15 @@ def _in_grey(
         return _as_hinted(hint, edges, windows, settings)
     masked = np.where(windows[side], answer, 0.0)
     row, column = np.unravel_index(int(masked.argmax()), masked.shape)
-    panel = (view.s > edges[0]) & (view.s < edges[1])
-    first, last = _extent(view.grey, (int(row), int(column)), panel, noise, settings)
-    rows = slice(max(row - 4, 0), row + 5)
-    weights = np.maximum(answer[rows, first : last + 1].mean(axis=1) - 0.25 * peaks[side], 0.0)
-    z = float(np.average(view.z[rows], weights=weights if weights.sum() > 0.0 else None))
-    shift = shifts[edges[0] if side == "left" else edges[1]]
-    outward = shift * (-1.0 if side == "left" else 1.0) > 0.0
-    span = Span(float(view.s[first]), float(view.s[last]), shift, outward)
+    at = float(view.s[column]), float(view.z[row])
     seen = hint if trust is settings.confirmed else None
-    kind, at, along = kind_of(span, 1.0 if seen is None else seen.lever_odds, settings)
-    up = settings.up_noise
+    found = kind_of(view, side, at, 1.0 if seen is None else seen.lever_odds, settings)
+    along, up = found.along, found.up
     if seen is not None:  # by how much both disagree beyond what the network knows
-        along = np.hypot(along, max(abs(at - seen.s) - settings.hint_noise[0], 0.0))
-        up = np.hypot(up, max(abs(z - seen.z) - settings.hint_noise[1], 0.0))
-    return Handle(side, kind, at, z, ratio, other, float(along), float(up))
+        along = np.hypot(along, max(abs(found.s - seen.s) - settings.hint_noise[0], 0.0))
+        up = np.hypot(up, max(abs(found.z - seen.z) - settings.hint_noise[1], 0.0))
+    kind = found.kind if found.odds > settings.min_odds else ""
+    return Handle(side, kind, found.odds, found.s, found.z, ratio, other, float(along), float(up))
 
 
 def _as_hinted(
@@ -187,9 +181,12 @@ def _as_hinted(
     if not windows[side].any() or not low <= hint.z <= high:
         return None
     along, up = settings.hint_noise
-    if hint.kind == "bar":
+    kind, odds = hint.kind, max(hint.lever_odds, 1.0 / hint.lever_odds)
+    if kind == "bar":
         up = settings.bar_noise
-    return Handle(side, hint.kind, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
+    elif odds < settings.min_odds:
+        kind = ""
+    return Handle(side, kind, odds, hint.s, hint.z, settings.alone.ratio, np.inf, along, up)
 
 
 def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> NDArray[np.float32]:
@@ -203,40 +200,6 @@ def bar_response(grey: NDArray[np.float32], bar: tuple[float, float, float]) -> 
     below = mean - np.roll(mean, -gap, axis=0)
     same = above * below > 0.0
     return np.where(same, np.sign(above) * np.minimum(np.abs(above), np.abs(below)), 0.0)
-
-
-def _extent(
-    grey: NDArray[np.float32],
-    peak: tuple[int, int],
-    panel: NDArray[np.bool_],
-    noise: float,
-    settings: HandleSettings,
-) -> tuple[int, int]:
-    """Return first and last column of what differs from what is above it, as the peak does.
-
-    Above, not below: there may be its shadow, a rosette or a keyhole. How clear it is on the
-    ``panel`` (columns,) counts, not before the reveal beside it.
-    """
-    row, column = peak
-    gap = round(settings.bar[2] / _PIXEL)
-    lean = round(0.5 * settings.bar[1] / _PIXEL)
-    thin = cv2.blur(grey, (3, 3), borderType=cv2.BORDER_REPLICATE)
-    above = thin[max(row - gap - lean, 0)]
-    band = thin[max(row - lean, 0) : row + lean + 1] - above
-    sign = np.sign(band[:, column][np.abs(band[:, column]).argmax()])
-    contrast = (sign * band).max(axis=0)
-    reach = round(_REACH / _PIXEL)
-    window = slice(max(column - reach, 0), column + reach + 1)
-    clear = float(np.where(panel, contrast, 0.0)[window].max())
-    on_it = contrast > max(settings.extent * clear, 4.0 * noise)
-    ends = [column, column]
-    for k, step in enumerate((-1, 1)):
-        misses, i = 0, column
-        while 0 <= i + step < len(on_it) and misses < _JOINED and abs(i - column) < 2 * reach:
-            i += step
-            misses = 0 if on_it[i] else misses + 1
-            ends[k] = i if on_it[i] else ends[k]
-    return ends[0], ends[1]
 
 
 def _in_depth(
@@ -266,5 +229,13 @@ def _in_depth(
         return None  # it goes on above or below where handles are
     along, up = settings.hint_noise
     return Handle(
-        side, "lever", float(view.s[column]), float(view.z[row]), peaks[side], other, along, up
+        side,
+        "lever",
+        np.inf,
+        float(view.s[column]),
+        float(view.z[row]),
+        peaks[side],
+        other,
+        along,
+        up,
     )

@@ -1,4 +1,4 @@
-"""Lever or knob: what a handle spans on its panel tells its kind, and where its middle is."""
+"""Lever or knob: which of them explains better what is seen around a handle."""
 
 from __future__ import annotations
 
@@ -6,63 +6,65 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kmn_perception.doors.handle_shape import KINDS, explain
 from kmn_perception.doors.part_settings import HandleSettings
+from kmn_perception.doors.wall_view import WallView
 
 
-class Span(NamedTuple):
-    """What a handle spans on its panel.
-
-    What stands out is seen shifted against its foot, and the neck between them joins the two. A
-    lever points inward: it hides its neck where the shift is outward, and prolongs it elsewhere.
+class SeenKind(NamedTuple):
+    """The kind of a handle, and its middle.
 
     Attributes
     ----------
-    first, last
-        Along the panel, metres.
-    shift
-        Of a handle's middle against the point of the panel behind it, metres to the right.
-    outward
-        Whether that is towards the panel's nearer edge.
+    kind
+        The likelier one.
+    odds
+        How much likelier it is than the other.
+    s, z
+        See `Handle`, metres.
+    along, up
+        Standard deviations of these, which hold for the other kind, too, metres.
     """
 
-    first: float
-    last: float
-    shift: float
-    outward: bool
-
-    def excess(self, kind: str, settings: HandleSettings) -> float:
-        """Return by how much it is longer than a kind of handle, metres."""
-        if kind == "knob":
-            expected = settings.knob + abs(self.shift)
-        else:
-            expected = settings.lever + (0.0 if self.outward else abs(self.shift))
-        return self.last - self.first - expected
-
-    def middle(self, kind: str, settings: HandleSettings) -> float:
-        """Return where the middle of a kind of handle is seen, metres along the panel."""
-        length = self.last - self.first
-        if kind == "knob" or not self.outward:
-            length = max(length - abs(self.shift), settings.knob)
-        return self.last - 0.5 * length if self.shift > 0.0 else self.first + 0.5 * length
+    kind: str
+    odds: float
+    s: float
+    z: float
+    along: float
+    up: float
 
 
-def kind_of(seen: Span, lever_odds: float, settings: HandleSettings) -> tuple[str, float, float]:
-    """Return what is seen, where its middle is, and the deviation of that, metres.
+def kind_of(
+    view: WallView,
+    side: str,
+    at: tuple[float, float],
+    lever_odds: float,
+    settings: HandleSettings,
+) -> SeenKind:
+    """Return what is seen at a place of a panel.
 
-    Length and network speak for a lever or a knob; where neither is sure, the middle may be that
-    of the other kind.
+    What each kind leaves unexplained and the network speak for one of them; where neither is sure,
+    the middle may be that of the other kind.
 
     Parameters
     ----------
+    side
+        At which the latch is, ``left`` or ``right`` as seen.
+    at
+        About where its middle is seen: metres along the panel and above the floor.
     lever_odds
         How much likelier than a knob a lever is to the network; 1 without one.
     """
-    excess = np.array([seen.excess(kind, settings) for kind in ("knob", "lever")])
-    evidence = float(np.diff(-(excess**2))[0]) / (2.0 * settings.length_deviation**2)
+    shape = settings.shape
+    lever, knob = (explain(view, kind, side, at, shape) for kind in KINDS)
+    # Of Gaussian errors with an unknown deviation, as many as are independent of each other.
+    evidence = shape.weight * np.log(knob.misfit / lever.misfit)
     most = np.log(settings.max_odds)
     evidence += float(np.clip(np.log(lever_odds), -most, most))
-    kinds = ("lever", "knob") if evidence > 0.0 else ("knob", "lever")
-    at, other = (seen.middle(kind, settings) for kind in kinds)
-    doubt = 1.0 / (1.0 + np.exp(abs(evidence)))
-    apart = np.sqrt(doubt * (1.0 - doubt)) * (other - at)
-    return kinds[0], at, float(np.hypot(settings.along_noise, apart))
+    kinds = KINDS if evidence > 0.0 else KINDS[::-1]
+    seen, other = (lever, knob) if evidence > 0.0 else (knob, lever)
+    odds = float(np.exp(abs(evidence)))
+    spread = np.sqrt(odds) / (1.0 + odds)  # of two places, by how likely each of them is
+    along = np.hypot(settings.along_noise, spread * (other.s - seen.s))
+    up = np.hypot(settings.up_noise, spread * (other.z - seen.z))
+    return SeenKind(kinds[0], odds, seen.s, seen.z, float(along), float(up))

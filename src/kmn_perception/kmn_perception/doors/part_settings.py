@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from kmn_perception.configuration.settings import Fraction, Interval, Positive
+from kmn_perception.configuration.settings import Count, Fraction, Interval, Positive
 
 
 class TrustSettings(NamedTuple):
@@ -22,6 +22,38 @@ class TrustSettings(NamedTuple):
     contrast: Positive
     ratio: Positive
     other: Positive
+
+
+class ShapeSettings(NamedTuple):
+    """How well a kind of handle explains the image about it.
+
+    Attributes
+    ----------
+    lengths
+        How many lengths of a lever are tried.
+    reach
+        From where it is expected, along the panel and up, metres.
+    around
+        Of the pixels that must be explained, metres to either side, up and along.
+    template
+        Of what is drawn of a handle, metres to either side of its middle, up and along.
+    above
+        Heights over it, metres, between which what is behind it is seen.
+    noise, clip
+        Deviation of what is predicted at best, and the difference from which on one is as wrong as
+        another, of the logarithm of grey.
+    weight
+        Of the logarithm of misfits' ratio in that of odds: half as many errors as are independent.
+    """
+
+    lengths: Count
+    reach: tuple[float, float]
+    around: tuple[float, float]
+    template: tuple[float, float]
+    above: Interval
+    noise: Positive
+    clip: Positive
+    weight: Positive
 
 
 @dataclass(frozen=True)
@@ -52,14 +84,12 @@ class HandleSettings:
         Depth: the handle's mean offset that counts, in standard deviations of such means.
     along_noise, up_noise
         Standard deviations of its middle, metres.
-    lever, knob
-        Usual lengths, metres.
-    length_deviation
-        Standard deviation of a handle's length, metres.
-    extent
-        It reaches as far as this part of its largest contrast.
+    shape
+        How what a kind of handle predicts is compared with the image.
     max_odds
         Of the network's for a lever against a knob: aslant, a knob on a stem looks like a lever.
+    min_odds
+        For one of both against the other, from which on it is told.
     """
 
     heights: Interval
@@ -78,11 +108,9 @@ class HandleSettings:
     bump: Positive
     along_noise: Positive
     up_noise: Positive
-    lever: Positive
-    knob: Positive
-    length_deviation: Positive
-    extent: Fraction
+    shape: ShapeSettings
     max_odds: Positive
+    min_odds: Positive
 
 
 @dataclass(frozen=True)

@@ -50,8 +50,9 @@ class VerticalSettings:
     max_floor_tilt, max_wall_tilt
         Angles to the image's upward direction that a floor's, and to the horizontal that a wall's
         normal may have, radians.
-    floor_deviation, wall_deviation, image_deviation
-        Standard deviations of what a floor, a wall and the image's upward direction tell, radians.
+    floor_deviation, wall_deviation, image_deviation, given_deviation
+        Standard deviations of what a floor, a wall, the image's upward direction and a camera's
+        pose tell, radians: a camera may hang askew on its mount.
     min_segment, segment_noise
         Shortest line segment, and standard deviation of its ends, pixels.
     search, accept
@@ -66,6 +67,7 @@ class VerticalSettings:
     floor_deviation: Positive
     wall_deviation: Positive
     image_deviation: Positive
+    given_deviation: Positive
     min_segment: Positive
     segment_noise: Positive
     search: Positive

@@ -19,6 +19,7 @@ from kmn_perception.doors.search_settings import VerticalSettings
 from kmn_perception.model.camera import Camera
 
 _REWEIGHTINGS = 12
+_DEVIATIONS = 5.0  # of what is known before, within which segments may be vertical
 _UNDER, _FEW = 0.1, 0.4  # lower by this part of the height; how much of it reflections are
 IMAGE_UP = np.array([0.0, -1.0, 0.0])
 
@@ -75,19 +76,23 @@ def find_up(
     segments: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
     settings: VerticalSettings,
     expected: NDArray[np.float64] = IMAGE_UP,
+    is_given: bool = False,
 ) -> NDArray[np.float64]:
     """Return the unit vector (3,) that points up, in the optical frame.
 
     It is the direction least against all that is known: perpendicular to walls and to the planes of
     vertical segments, near the floor's normal or, without a floor, near the one that is expected.
+    One that ``is_given``, by the camera's pose, is better than what a floor tells.
     """
     floor = max(
         (p for p in planes if p.normal @ expected > np.cos(settings.max_floor_tilt)),
         key=lambda plane: plane.blocks,
         default=None,
     )
-    guess = expected if floor is None else floor.normal
+    guess = expected if is_given or floor is None else floor.normal
     trust = settings.image_deviation if floor is None else settings.floor_deviation
+    if is_given:
+        trust = settings.given_deviation
     known = (np.eye(3) - np.outer(guess, guess)) / trust**2
     for plane in planes:
         if abs(plane.normal @ guess) < np.sin(settings.max_wall_tilt):
@@ -96,7 +101,7 @@ def find_up(
     if segments is None:
         return up
     normals, deviations = segments
-    window = settings.search
+    window = min(settings.search, _DEVIATIONS * trust)
     for _ in range(_REWEIGHTINGS):
         off = normals @ up
         scale = 3.0 * deviations + window / 6.0

@@ -26,7 +26,13 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         status, reason = DoorStatus.NO_DOOR, "a flat rectangle without a handle may be anything"
     elif handle is None:
         status = DoorStatus.HANDLE_NOT_SEEN
-        reason = "no handle is seen; it is sought " + _where(found)
+        reason = f"no handle is seen; it is sought {_where(found, ' at either edge')}"
+    elif not handle.kind:
+        status = DoorStatus.HANDLE_NOT_SEEN
+        reason = (
+            f"a lever and a knob explain the handle nearly as well, one {handle.odds:.1f} times "
+            f"as likely as the other, expected {settings.handle.min_odds:g}; it is {_where(found)}"
+        )
     else:
         status = DoorStatus.OK
     frame = found.candidate.view.frame
@@ -148,9 +154,9 @@ def _is_door_without_handle(found: Measurement, settings: DoorSettings) -> bool:
     return abs(found.surfaces.opening) >= settings.verdict.min_opening or deep
 
 
-def _where(found: Measurement) -> str:
+def _where(found: Measurement, edge: str = "") -> str:
     height, away = found.shape.handle_height, found.shape.handle[1]
-    return f"{height:.2f} m above the floor at either edge, {away:.1f} m away"
+    return f"{height:.2f} m above the floor{edge}, {away:.1f} m away"
 
 
 def _camera_pose(frame: WallFrame, height: float) -> NDArray[np.float64]:

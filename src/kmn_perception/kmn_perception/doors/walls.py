@@ -106,9 +106,9 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
         raise NoWallError("no plane is seen")
     up = _up(frame, planes, settings)
     if frame.up is not None:
-        wrong = find_contradiction(planes, up, frame.height, settings)
+        wrong = find_contradiction(planes, frame.up, frame.height, settings)
         if not wrong and frame.grey is not None:
-            wrong = doubt_tilt(up, _seen_up(frame, planes, up, settings), settings)
+            wrong = doubt_tilt(frame.up, _seen_up(frame, planes, frame.up, settings), settings)
         if wrong:
             raise NoWallError(wrong)
     walls = [p for p in planes if abs(p.normal @ up) < np.sin(settings.vertical.max_wall_tilt)]
@@ -129,8 +129,13 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
 
 
 def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:
-    """Return the upward vector (3,) as it is given, or as the frame shows it."""
-    return _seen_up(frame, planes, IMAGE_UP, settings) if frame.up is None else frame.up
+    """Return the upward vector (3,) as the frame shows it, near the one that is given."""
+    if frame.up is None:
+        return _seen_up(frame, planes, IMAGE_UP, settings)
+    if frame.grey is None:
+        return frame.up
+    segments = line_segments(frame.grey, frame.camera, settings.vertical)
+    return find_up(planes, segments, settings.vertical, frame.up, is_given=True)
 
 
 def _seen_up(

@@ -14,6 +14,7 @@ from kmn_perception.refinement.problem import Problem
 
 MIN_INFORMATION = 1e-12
 MIN_COMPONENT = 1e-3  # of a direction, in half ranges; smaller ones do not reach a limit
+SQUARE_OUTLINE = 4.0  # length of a square's outline by the root of its area
 DOUBLINGS, BISECTIONS = 4, 7  # in the search for the ends of the possible values
 
 
@@ -131,16 +132,21 @@ def _loss_along(
 ) -> Callable[[float], float]:
     """Return the negative log-likelihood as a function of the distance along a direction.
 
-    Pixels far from the edges that are explained wrongly count as well. The edges count up to their
-    ends, so that the pixels that count do not change with them.
+    Pixels far from the edges that are explained wrongly count as well, if they are more than an
+    error of the object's shape makes of its outline. The edges count up to their ends, so that the
+    pixels that count do not change with them.
     """
     depth_information = float(direction @ fit.depth_information @ direction)
-    pixels = min(len(problem.image.pixels), problem.settings.misfit.pixels)
+    count = len(problem.image.pixels)
+    pixels = min(count, problem.settings.misfit.pixels)
+    slack = problem.shape_error_in_pixels * SQUARE_OUTLINE / np.sqrt(count)
+    allowed = problem.misfit(values) + slack
 
     def loss(distance: float) -> float:
         moved = values + distance * direction
         edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
-        return edges + problem.misfit(moved) * pixels + 0.5 * depth_information * distance**2
+        wrong = max(problem.misfit(moved), allowed if slack > 0.0 else 0.0)
+        return edges + wrong * pixels + 0.5 * depth_information * distance**2
 
     return loss
 

@@ -16,9 +16,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.refinement.correlation import newey_west_variance
+from kmn_perception.refinement.edge_settings import EdgeSettings
 from kmn_perception.refinement.image import InverseDepthImage, Noise, height_at
 from kmn_perception.refinement.probit import EdgeSums, add_pixel, add_probit
-from kmn_perception.refinement.settings import EdgeSettings
 from kmn_perception.refinement.silhouette import (
     Crossing,
     Strip,
@@ -73,12 +73,19 @@ class EdgeSampling(NamedTuple):
         Samples closer than this to the ends of an edge are left out, pixels.
     max_samples
         Approximate maximum number of samples of each edge.
+    max_crease
+        Half the width of the face that ends in a crease at most, pixels: the depths of a wider one
+        tell where it is.
+    shape_error
+        Standard deviation by which a whole edge lies or leans off the model's, pixels.
     """
 
     noise: Noise
     window: float
     border: float
     max_samples: int
+    max_crease: float
+    shape_error: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,6 +100,8 @@ def edge_terms(
     for body in range(view.lines.shape[0]):
         for edge in range(12):
             if view.faces[body, edge] >= 0:
+                if view.creases[body, edge] > sampling.max_crease:
+                    continue
                 sums = EdgeSums(np.zeros((3, 3)), np.zeros(3), totals)
                 visible = _add_edge(view, image, settings, sampling, body, edge, sums)
                 jacobian = view.line_jacobians[body, edge]
@@ -126,6 +135,7 @@ def _add_edge(
     last = min(extent - 1, math.floor(high - border))
     samples = max(last - first + 1, 1)
     min_noise = max(noise.lateral, 1.0 / samples)
+    face = faces[edge] if view.creases[body, edge] > 0.0 else -1
     outwards = sampling.window / abs(line[1 - along])
     buffer = np.empty(2 * math.ceil(outwards) + 1)
     shifts = np.zeros(samples)
@@ -141,7 +151,7 @@ def _add_edge(
             continue
         inwards = min(outwards, half_chord(lines, all_ends, faces, edge, crossing))
         strip = strip_around(
-            solids, image, settings, noise.depth, body, crossing, (outwards, inwards), buffer
+            solids, image, settings, noise, body, face, crossing, (outwards, inwards), buffer
         )
         if strip.evidence.shape[0] == 0:
             continue
@@ -168,6 +178,7 @@ def _add_edge(
         phases = settings.subpixel_phases * (last - first) * abs(line[along] / line[1 - along])
         weight = 1.0 / (1.0 + moment[2, 2] / (ROUNDING_INFORMATION * (1.0 + phases**2)))
         weight *= _independent(shifts, settings.correlated_samples)
+        weight /= 1.0 + sampling.shape_error**2 * weight * moment[2, 2]
         moment *= weight
         force *= weight
     return with_step > settings.min_visible * sampled

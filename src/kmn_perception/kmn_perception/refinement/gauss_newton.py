@@ -13,14 +13,13 @@ from kmn_perception.refinement.edges import (
     EdgeTerms,
     edge_terms,
 )
-from kmn_perception.refinement.image import Noise
+from kmn_perception.refinement.image import MEDIAN_TO_SIGMA, Noise
 from kmn_perception.refinement.planes import PlaneSampling, PlaneTerms, plane_terms
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.reacquisition import reacquire
 from kmn_perception.refinement.settings import SearchSettings
 from kmn_perception.refinement.view import ModelView
 
-MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 MAX_NOISE_CHANGE = 0.7  # of the logarithm of the lateral noise in a step
 UNLIMITED = 10**6  # samples of an edge
 
@@ -53,9 +52,7 @@ def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     for level in settings.search:
         values = _search(problem, values, level)
     steps = sum(level.steps for level in settings.search)
-    reacquired = reacquire(
-        problem.shape, problem.image, problem.limits, values, settings.reacquisition
-    )
+    reacquired = reacquire(problem, values)
     if reacquired is not values:
         values = _search(problem, reacquired, settings.search[-1])
         steps += settings.search[-1].steps
@@ -74,17 +71,21 @@ def _search(
         robust=SEARCH_DEVIATIONS,
         border=0.0,
         correlated_rows=settings.correlated_rows,
+        shape_error=0.0,
     )
     edge_sampling = EdgeSampling(
         noise=Noise(noise / SEARCH_DEVIATIONS, 0.0),
         window=level.window,
         border=0.0,
         max_samples=level.samples,
+        max_crease=level.window,
+        shape_error=0.0,
     )
+    steps = settings.edges._replace(contrast=problem.visible_step)
     for _ in range(level.steps):
         view = problem.view(values)
         planes = plane_terms(view, problem.image, plane_sampling)
-        edges = edge_terms(view, problem.image, settings.edges, edge_sampling)
+        edges = edge_terms(view, problem.image, steps, edge_sampling)
         values = problem.clipped(values + _step(problem, values, planes, edges)[0])
     return values
 
@@ -123,6 +124,7 @@ def _fine_planes(problem: Problem, view: ModelView, noise: Noise, pixels: int) -
         robust=settings.fine.robust,
         border=settings.fine.border * noise.lateral,
         correlated_rows=settings.correlated_rows,
+        shape_error=problem.shape_error * problem.inverse_depth_per_metre,
     )
     return plane_terms(view, problem.image, sampling)
 
@@ -142,6 +144,8 @@ def fine_edges(problem: Problem, view: ModelView, noise: Noise, border: float) -
         window=max(settings.min_window, settings.window * noise.lateral),
         border=border * noise.lateral,
         max_samples=UNLIMITED,
+        max_crease=settings.border * noise.lateral,
+        shape_error=problem.shape_error_in_pixels,
     )
     return edge_terms(view, problem.image, problem.settings.edges, sampling)
 

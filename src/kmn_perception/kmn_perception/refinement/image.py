@@ -12,6 +12,8 @@ from kmn_perception.model.observation import Observation, all_free
 from kmn_perception.refinement.settings import OcclusionSettings
 
 MIN_RANGE = 1e-6  # metres
+MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
+SECOND_DIFFERENCE = 6.0**0.5  # standard deviation of x - 2 y + z, in that of x, y and z
 
 
 class Noise(NamedTuple):
@@ -124,3 +126,17 @@ def _overlay(inverse_depth: NDArray[np.float32], seen: NDArray[np.float32]) -> N
                 pixels[count, 0], pixels[count, 1], pixels[count, 2] = column, row, scale
                 count += 1
     return pixels[:count].copy()
+
+
+def single_pixel_noise(inverse_depth: NDArray[np.float32]) -> float:
+    """Return the standard deviation of inverse depths (1 / m), from neighbours along rows.
+
+    A plane's inverse depths change evenly along a row, so that their second differences are those
+    of the noise; that of few pixels at edges does not change the median.
+    """
+    left, middle, right = inverse_depth[:, :-2], inverse_depth[:, 1:-1], inverse_depth[:, 2:]
+    measured = (left > 0.0) & (middle > 0.0) & (right > 0.0)
+    if not measured.any():
+        return 0.0
+    second = np.abs(left[measured] - 2.0 * middle[measured] + right[measured])
+    return MEDIAN_TO_SIGMA * float(np.median(second)) / SECOND_DIFFERENCE

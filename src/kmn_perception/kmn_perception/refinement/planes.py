@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from kmn_perception.refinement.correlation import newey_west_variance
 from kmn_perception.refinement.image import InverseDepthImage, Noise
-from kmn_perception.refinement.solids import gradient, inverse_depth_at, raycast_any
+from kmn_perception.refinement.solids import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    gradient,
+    inverse_depth_at,
+    raycast_any,
+)
 from kmn_perception.refinement.view import ModelView, add_normal_equations
 
 
@@ -43,10 +51,13 @@ class PlaneSampling(NamedTuple):
     robust
         Differences beyond this many standard deviations lose their weight (Geman and McClure).
     border
-        Pixels closer than this to the border of a face are left out: those that happened to look
-        beyond it show something else, or nothing, and the others would be biased.
+        Pixels closer than this to the border of a face, or to another body, are left out: those
+        that happened to look beyond it show something else, or nothing, and the others would be
+        biased.
     correlated_rows
         Number of neighbouring rows (or columns) whose errors may be correlated.
+    shape_error
+        Standard deviation by which a whole face lies or leans off the model's, 1 / m.
     """
 
     noise: Noise
@@ -54,6 +65,7 @@ class PlaneSampling(NamedTuple):
     robust: float
     border: float
     correlated_rows: int
+    shape_error: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,7 +74,8 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
 
     The prediction q . (u, v, 1) is linear in the plane, so that all pixels of a face are summed up
     in one moment matrix. Where the quantization of a sensor shifts whole rows or columns of a face
-    together, as the sums of their residuals show, the face loses weight accordingly.
+    together, as the sums of their residuals show, the face loses weight accordingly; and however
+    many pixels show it, they tell no more of it than its shape allows.
     """
     pixels = image.pixels
     height, width = image.inverse_depth.shape
@@ -81,7 +94,10 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
         predicted, body, face = raycast_any(solids, u, v)
         if body < 0 or predicted > image.nearest or predicted < image.farthest:
             continue
-        if sampling.border > 0.0 and _at_border(solids, borders, body, face, u, v, predicted):
+        if sampling.border > 0.0 and (
+            _at_border(solids, borders, body, face, u, v, predicted)
+            or _beside_another(view, body, u, v, sampling.border)
+        ):
             continue
         residual = (pixels[i, 2] - predicted) / deviations[body, face]
         residuals[count] = residual
@@ -112,6 +128,7 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
             rows = newey_west_variance(row_sums[body, face], sampling.correlated_rows)
             columns = newey_west_variance(column_sums[body, face], sampling.correlated_rows)
             inflation = max(1.0, rows / counts[body, face], columns / counts[body, face])
+            inflation += sampling.shape_error**2 * moment[2, 2]
             jacobian = view.plane_jacobians[body, face]
             add_normal_equations(hessian, total, jacobian, moment / inflation, force / inflation)
     return PlaneTerms(hessian, total, residuals[:count])
@@ -160,4 +177,30 @@ def _at_border(
             beyond = inverse_depth_at(solids, body, other, u, v)
             if abs(inverse_depth - beyond) < borders[body, face, other]:
                 return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def _beside_another(view: ModelView, body: int, u: float, v: float, border: float) -> bool:
+    """Return whether a pixel that shows a body lies near the silhouette of another, outside it."""
+    solids = view.solids
+    for other in range(solids.shape[0]):
+        if (
+            other == body
+            or u < solids[other, LEFT] - border
+            or u > solids[other, RIGHT] + border
+            or v < solids[other, TOP] - border
+            or v > solids[other, BOTTOM] + border
+        ):
+            continue
+        inside, near = True, True
+        for edge in range(12):
+            if view.faces[other, edge] < 0:
+                continue
+            line = view.lines[other, edge]
+            distance = line[0] * u + line[1] * v + line[2] + view.creases[other, edge]
+            inside = inside and distance >= 0.0
+            near = near and distance > -border
+        if near and not inside:
+            return True
     return False

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.geometry import Shape, cuboids, shape_of
-from kmn_perception.refinement.image import InverseDepthImage, inverse_depth_image
+from kmn_perception.refinement.image import (
+    InverseDepthImage,
+    inverse_depth_image,
+    single_pixel_noise,
+)
 from kmn_perception.refinement.misfit import misfit
 from kmn_perception.refinement.settings import RefinementSettings
 from kmn_perception.refinement.view import ModelView, model_view
@@ -21,20 +25,31 @@ MIN_MOVEMENT = 1e-12  # pixels per unit
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A model, its P parameters' limits (P, 2), and an observation of it."""
+    """A model, its P parameters' limits (P, 2), and an observation of it.
+
+    Attributes
+    ----------
+    shape_error
+        Standard deviation by which faces and edges lie off those of the model, metres.
+    """
 
     shape: Shape
     limits: NDArray[np.float64]
     image: InverseDepthImage
     settings: RefinementSettings
+    shape_error: float
 
     @classmethod
     def of(
-        cls, model: KinematicModel, observation: Observation, settings: RefinementSettings
+        cls,
+        model: KinematicModel,
+        observation: Observation,
+        settings: RefinementSettings,
+        shape_error: float = 0.0,
     ) -> Problem:
         """Return the problem of fitting a model to an observation."""
         image = inverse_depth_image(observation, settings.occlusion)
-        return cls(shape_of(model), model.limits, image, settings)
+        return cls(shape_of(model), model.limits, image, settings, shape_error)
 
     @cached_property
     def half_range(self) -> NDArray[np.float64]:
@@ -47,13 +62,31 @@ class Problem:
         stride = self.stride(self.settings.distance_pixels)
         return float(np.mean(self.image.pixels[::stride, 2])) ** 2
 
+    @cached_property
+    def depth_noise(self) -> float:
+        """Standard deviation of the inverse depth of single pixels, 1 / m."""
+        return single_pixel_noise(self.image.inverse_depth)
+
+    @cached_property
+    def visible_step(self) -> float:
+        """Smallest step in depth that single pixels show, metres."""
+        settings = self.settings.edges
+        noise = self.depth_noise / self.inverse_depth_per_metre
+        return max(settings.contrast, settings.single * noise)
+
+    @cached_property
+    def shape_error_in_pixels(self) -> float:
+        """The same in the image, at the object's distance."""
+        focal_length = float(np.linalg.norm(self.image.projection[0, :3]))
+        return self.shape_error * focal_length * float(np.sqrt(self.inverse_depth_per_metre))
+
     def stride(self, pixels: int) -> int:
         """Return the stride that leaves about this many of the observed pixels."""
         return max(1, round(len(self.image.pixels) / pixels))
 
     def view(self, values: NDArray[np.float64]) -> ModelView:
         """Return the model at ``values`` (P,) as the sensor sees it."""
-        return model_view(self.shape, values, self.image.projection)
+        return model_view(self.shape, values, self.image.projection, self.settings.edges.contrast)
 
     def misfit(self, values: NDArray[np.float64]) -> float:
         """Return the fraction of pixels that the model explains wrongly, from some of them."""

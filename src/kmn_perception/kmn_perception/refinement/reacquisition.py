@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.refinement.geometry import Shape, cuboids
 from kmn_perception.refinement.image import InverseDepthImage, may_hide
-from kmn_perception.refinement.settings import ReacquisitionSettings
+from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.solids import (
     BOTTOM,
     LEFT,
@@ -19,24 +19,19 @@ from kmn_perception.refinement.solids import (
     raycast_any,
     raycast_others,
 )
-from kmn_perception.refinement.view import ModelView, model_view
+from kmn_perception.refinement.view import ModelView
 
 
-def reacquire(
-    shape: Shape,
-    image: InverseDepthImage,
-    limits: NDArray[np.float64],
-    values: NDArray[np.float64],
-    settings: ReacquisitionSettings,
-) -> NDArray[np.float64]:
+def reacquire(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the values (P,) with bodies moved that the observation does not show in their places.
 
     Only parameters that move no other body are changed, on a grid within their limits.
     """
-    for body, own in enumerate(_own_parameters(shape, values)):
+    settings, limits = problem.settings.reacquisition, problem.limits
+    for body, own in enumerate(_own_parameters(problem.shape, values)):
         if not own:
             continue
-        best = support(model_view(shape, values, image.projection), image, body)
+        best = support(problem.view(values), problem.image, body)
         if best >= settings.min_support:
             continue
         start, count = values, max(2, int(settings.candidates ** (1.0 / len(own))))
@@ -44,7 +39,7 @@ def reacquire(
         for place in itertools.product(*axes):
             candidate = start.copy()
             candidate[own] = place
-            found = support(model_view(shape, candidate, image.projection), image, body)
+            found = support(problem.view(candidate), problem.image, body)
             if found > best:
                 values, best = candidate, found
     return values

@@ -16,7 +16,8 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
-from kmn_perception.refinement.support_settings import SupportSettings
+from kmn_perception.refinement.edge_settings import EdgeSettings
+from kmn_perception.refinement.support_settings import CurvatureSettings, SupportSettings
 
 Window = Annotated[float, Field(ge=1.0, le=64.0)]
 Pixels = Annotated[int, Field(ge=100)]
@@ -107,49 +108,6 @@ class FineSettings:
     shorten_after: Count
 
 
-class EdgeSettings(NamedTuple):
-    """What distinguishes a body from what lies in front of it and behind it, at its silhouette.
-
-    Attributes
-    ----------
-    occluder
-        What lies at least this far in front of the edge belongs to something else, metres.
-    background
-        So does what lies at least this far behind it where the model has nothing, metres.
-    contrast
-        Minimum step in depth between two bodies that can be told apart, metres.
-    distinct
-        Number of standard deviations by which two depths differ for certain.
-    floor_margin
-        Edges less than this above the floor are not used, metres.
-    outliers
-        Fraction of pixels that may show anything.
-    interpolated
-        Fraction of the probability that remains where the depth is interpolated.
-    stepless_weight
-        Weight, in the coarse search, of a sample in which no depth step was found.
-    min_visible
-        An edge is in view when at least this fraction of its samples has a depth step.
-    subpixel_phases
-        The rounding to pixels averages out along an edge that shifts by more than 1 /
-        ``subpixel_phases`` of a pixel from its first sample to its last.
-    correlated_samples
-        Number of neighbouring samples of an edge whose errors may be correlated.
-    """
-
-    occluder: NonNegative
-    background: NonNegative
-    contrast: NonNegative
-    distinct: NonNegative
-    floor_margin: NonNegative
-    outliers: Annotated[float, Field(gt=0.0, lt=0.5)]
-    interpolated: Fraction
-    stepless_weight: Fraction
-    min_visible: Fraction
-    subpixel_phases: NonNegative
-    correlated_samples: Count
-
-
 class OcclusionSettings(NamedTuple):
     """Where the object may be hidden behind something else.
 
@@ -178,8 +136,10 @@ class MisfitSettings(NamedTuple):
         A difference in depth (metres) that counts as much as a pixel on the wrong side.
     digits
         Decimals to which the misfit is rounded, so that rounding of the points does not decide.
-    retry_above
-        Above this misfit, other starts are tried.
+    boxes_above, retry_above
+        Above this misfit, cuboids around the points are tried, and other values of all parameters.
+    as_good
+        Fits whose misfits differ by less explain an observation equally well.
     reject_above
         Above this misfit, the result is not to be trusted.
     """
@@ -189,7 +149,9 @@ class MisfitSettings(NamedTuple):
     max_area: Count
     depth: Annotated[float, Field(gt=0.0, le=10.0)]
     digits: Annotated[int, Field(ge=1, le=15)]
+    boxes_above: NonNegative
     retry_above: NonNegative
+    as_good: NonNegative
     reject_above: NonNegative
 
 
@@ -200,17 +162,22 @@ class StartSettings:
     Attributes
     ----------
     yaws
-        Number of yaws, evenly spread over the range, that are compared where there is no estimate.
+        Number of yaws, spread over the range, that are compared where there is no estimate.
     fitted
         Number of the best of these from which the model is fitted.
     scanned
-        Number of values of each parameter, evenly spread over its range, that are tried after a bad
-        fit.
+        Number of values of each parameter, spread over its range, that are tried after a bad fit.
+    around
+        Number of yaws of the cuboids around the points that are tried after a fit that is not good.
+    rest
+        Fraction of the points that lies beyond each of their sides.
     """
 
     yaws: Annotated[int, Field(ge=1, le=100)]
     fitted: Annotated[int, Field(ge=1, le=100)]
     scanned: Annotated[int, Field(ge=1, le=100)]
+    around: Annotated[int, Field(ge=1, le=100)]
+    rest: Fraction
 
 
 @dataclass(frozen=True)
@@ -228,12 +195,15 @@ class UnobservableSettings:
         Number of points at which the likelihood along it is integrated.
     passes
         Number of times that several unobservable directions are gone through.
+    unknown
+        A parameter is not known from this fraction of the standard deviation of its limits on.
     """
 
     deviation: Fraction
     loss_rise: NonNegative
     points: Count
     passes: Count
+    unknown: Fraction
 
 
 @dataclass(frozen=True)
@@ -250,7 +220,7 @@ class RefinementSettings:
         Approximate number of observed pixels from which the object's distance is taken.
     correlated_rows
         Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
-    search, reacquisition, support, fine, edges, occlusion, misfit, starts, unobservable
+    search, reacquisition, support, curvature, fine, edges, occlusion, misfit, starts, unobservable
         Settings of the parts.
     damping
         Information that damps the steps, per squared pixel of movement.
@@ -270,6 +240,7 @@ class RefinementSettings:
     search: Annotated[tuple[SearchSettings, ...], Field(min_length=1)]
     reacquisition: ReacquisitionSettings
     support: SupportSettings
+    curvature: CurvatureSettings
     fine: FineSettings
     edges: EdgeSettings
     occlusion: OcclusionSettings

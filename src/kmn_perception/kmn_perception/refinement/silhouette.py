@@ -9,11 +9,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import InverseDepthImage, may_hide
-from kmn_perception.refinement.settings import EdgeSettings
-from kmn_perception.refinement.solids import inverse_depth_at, raycast, raycast_others
+from kmn_perception.refinement.edge_settings import EdgeSettings
+from kmn_perception.refinement.image import InverseDepthImage, Noise, may_hide
+from kmn_perception.refinement.solids import (
+    inverse_depth_at,
+    raycast,
+    raycast_any,
+    raycast_others,
+)
 
 MIN_SLOPE = 1e-9  # of an edge that crosses a row at all
+ROOT_HALF = math.sqrt(0.5)
+TINY = 1e-300
 MAX_LOG_RATIO = 100.0  # of likelihoods; nothing is more certain
 
 
@@ -95,23 +102,32 @@ def strip_around(
     solids: NDArray[np.float64],
     image: InverseDepthImage,
     settings: EdgeSettings,
-    depth_noise: float,
+    noise: Noise,
     body: int,
+    face: int,
     crossing: Crossing,
     reach: tuple[float, float],
     buffer: NDArray[np.float64],
 ) -> Strip:
     """Classify the pixels around the crossing of a body's edge.
 
+    There are none where the body stands out by less than ``settings.contrast`` at the edge.
+
     Parameters
     ----------
-    depth_noise
-        Standard deviation of the inverse depth, 1 / m.
+    noise
+        Standard deviations of the inverse depth, and lateral; 0: pixels look where they should.
+    face
+        Of which all pixels of the body are, as at creases (see `ModelView`); -1: those that rays
+        meet.
     reach
         How far to look outwards and inwards, pixels.
     buffer
         Memory for the evidence.
     """
+    beside = raycast_others(solids, body, *pixel(crossing, crossing.position))
+    if beside > 0.0 and 1.0 / beside - 1.0 / crossing.inverse_depth < settings.contrast:
+        return Strip(0, 1, buffer[:0])
     inverse_depth, interpolated = image.inverse_depth, image.interpolated
     position, horizontal, number = crossing.position, crossing.horizontal, crossing.number
     outwards, inwards = reach
@@ -124,18 +140,32 @@ def strip_around(
         start = min(math.floor(position + outwards), last)
         stop = max(math.ceil(position - inwards), 0)
     count = max((stop - start) * step + 1, 0)
+    front, _, _ = raycast_any(solids, *pixel(crossing, float(start + step * (count - 1))))
+    end = _end_of_others(solids, body, crossing, start, step) if beside > 0.0 else -np.inf
     for k in range(count):
         p = start + step * k
         column, row = (p, number) if horizontal else (number, p)
-        expected, _ = raycast(solids, body, float(column), float(row))
-        if expected == 0.0:
+        entered, _ = raycast(solids, body, float(column), float(row))
+        expected = entered
+        if face >= 0:
+            expected = inverse_depth_at(solids, body, face, float(column), float(row))
+        if expected <= 0.0:
             expected = crossing.inverse_depth
         seen = float(inverse_depth[row, column])
         if seen <= 0.0 and may_hide(image.occlusion, seen, interpolated[row, column], expected):
             buffer[k] = 0.0
             continue
         behind = raycast_others(solids, body, float(column), float(row))
-        buffer[k] = _evidence(settings, depth_noise, seen, expected, behind)
+        others = 1.0
+        if seen > 0.0 and end > -np.inf and noise.lateral > 0.0:
+            distance = (p - position) * step * abs(crossing.slope) / noise.lateral
+            empty = normal_probability(end * abs(crossing.slope) / noise.lateral - distance)
+            outside = max(normal_probability(-distance), TINY)
+            others = max(1.0 - empty / outside, settings.outliers)
+        if behind > expected and (beside > 0.0 or entered == 0.0):
+            buffer[k] = 0.0  # another body is in front
+            continue
+        buffer[k] = _evidence(settings, noise.depth, others, seen, expected, behind, beside, front)
         if interpolated[row, column]:
             buffer[k] *= settings.interpolated
     return Strip(start, step, buffer[:count])
@@ -143,34 +173,71 @@ def strip_around(
 
 @njit(cache=True, error_model="numpy")
 def _evidence(
-    settings: EdgeSettings, depth_noise: float, seen: float, expected: float, behind: float
+    settings: EdgeSettings,
+    depth_noise: float,
+    others: float,
+    seen: float,
+    expected: float,
+    behind: float,
+    beside: float,
+    front: float,
 ) -> float:
     """Return the evidence that a pixel shows the body rather than what is behind it, see `Strip`.
 
     Parameters
     ----------
-    seen, expected, behind
-        Inverse depths: of the pixel, of the body there, and of the model's other bodies (0 if there
-        are none).
+    others
+        Probability that a pixel that does not show the body shows another one and not nothing.
+    seen, expected, behind, beside, front
+        Inverse depths: of the pixel, of the body there, of the model's other bodies there, of those
+        behind the edge, and of what the model shows inside the edge (0 if there is none).
     """
-    if behind > expected:
-        return 0.0
     certain = 1.0 - settings.outliers
     if seen <= 0.0:
         return -certain
+    if behind > expected:
+        return certain  # beyond the edge is nothing, and a body in front of this one is not that
     depth = 1.0 / seen - 1.0 / expected
     margin = settings.distinct * depth_noise
     if depth < -settings.occluder and seen > expected + margin:
-        return 0.0
+        is_model = front > 0.0 and 1.0 / seen > 1.0 / front - settings.occluder
+        return certain if is_model and behind == 0.0 and beside == 0.0 else 0.0
     if behind == 0.0:
-        beyond = depth > settings.background and seen < expected - margin
-        return -certain if beyond else certain
+        if depth > settings.background and seen < expected - margin:
+            return -certain
+        if beside == 0.0:
+            return certain
+        behind = beside  # the border of another body, which a sensor frays, is not this one
     if 1.0 / behind - 1.0 / expected < settings.contrast:
         return 0.0
     middle, gap = 0.5 * (expected + behind), expected - behind
-    ratio = math.exp(-min(abs(seen - middle) * gap / depth_noise**2, MAX_LOG_RATIO))
-    probability = min(1.0 / (1.0 + ratio), certain)
-    return probability if seen > middle else -probability
+    log_odds = (seen - middle) * gap / depth_noise**2 - math.log(others)
+    probability = min(1.0 / (1.0 + math.exp(-min(abs(log_odds), MAX_LOG_RATIO))), certain)
+    return probability if log_odds > 0.0 else -probability
+
+
+@njit(cache=True, error_model="numpy")
+def _end_of_others(
+    solids: NDArray[np.float64], body: int, crossing: Crossing, start: int, step: int
+) -> float:
+    """Return where, outside an edge, no other body is behind it any more.
+
+    A negative number of pixels from the crossing; minus infinity if the others reach beyond the
+    strip. A pixel that looks there by mistake shows nothing, so that one that shows something is
+    the more likely to show the body.
+    """
+    p = math.ceil(crossing.position) - 1 if step > 0 else math.floor(crossing.position) + 1
+    while (p - start) * step >= 0:
+        if raycast_others(solids, body, *pixel(crossing, float(p))) == 0.0:
+            return (p - crossing.position) * step + 0.5
+        p -= step
+    return -np.inf
+
+
+@njit(cache=True, error_model="numpy")
+def normal_probability(x: float) -> float:
+    """Return the probability that a standard normal variable is smaller than x."""
+    return 0.5 * math.erfc(-x * ROOT_HALF)
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kmn_perception.refinement.image import InverseDepthImage, may_hide
+from kmn_perception.refinement.image import InverseDepthImage, Noise, may_hide
 from kmn_perception.refinement.problem import Problem
 from kmn_perception.refinement.solids import (
     BOTTOM,
@@ -33,6 +33,8 @@ class Residuals(NamedTuple):
     bodies
         (rows, columns) of the image's part with the model: which body it has there; `UNKNOWN` where
         there is none, nothing is measured, or something else is.
+    depths
+        (rows, columns) of the model, metres; 0 where there is none.
     sums, counts
         (rows + 1, columns + 1) integral images of the distances, metres along the optical axis to
         the first order, and of the pixels that have one.
@@ -41,12 +43,15 @@ class Residuals(NamedTuple):
     """
 
     bodies: NDArray[np.int8]
+    depths: NDArray[np.float64]
     sums: NDArray[np.float64]
     counts: NDArray[np.float64]
     missing: NDArray[np.int64]
 
 
-def unsupported(problem: Problem, values: NDArray[np.float64], names: Sequence[str]) -> str:
+def unsupported(
+    problem: Problem, values: NDArray[np.float64], noise: Noise, names: Sequence[str]
+) -> str:
     """Return what the observation contradicts in a fit, and how; empty if nothing.
 
     A body of which nothing is measured is not contradicted: that it is unknown is for the
@@ -56,11 +61,15 @@ def unsupported(problem: Problem, values: NDArray[np.float64], names: Sequence[s
     ----------
     values
         (P,) of the fit.
+    noise
+        Of the sensor, as estimated.
     names
         Of the bodies.
     """
     settings, solids = problem.settings.support, problem.view(values).solids
     residuals = residuals_of(solids, problem.image, settings)
+    frayed = round(settings.frayed * noise.lateral)
+    certain = problem.settings.edges.distinct * noise.depth / problem.inverse_depth_per_metre
     unexplained = ""
     for body, name in enumerate(names):
         area, rise = _area_and_rise(solids, body)
@@ -68,7 +77,8 @@ def unsupported(problem: Problem, values: NDArray[np.float64], names: Sequence[s
             continue
         sides = solids[body, [RIGHT, BOTTOM]] - solids[body, [LEFT, TOP]]
         radius = int(0.5 * settings.averaged * sides.min())
-        missing, beside = _compare(residuals, body, settings.distinct * rise, radius)
+        distinct = max(settings.distinct * rise, certain / (2 * radius + 1))
+        missing, beside = _compare(residuals, body, distinct, radius, frayed)
         if missing > settings.max_missing * area:
             share = min(missing / area, 1.0)
             return f"the {name} is not seen where the fit has it: {share:.0%} of it is missing"
@@ -95,6 +105,7 @@ def residuals_of(
     rows, columns = max(bottom - top + 1, 0), max(right - left + 1, 0)
     sums, counts = np.zeros((rows + 1, columns + 1)), np.zeros((rows + 1, columns + 1))
     bodies = np.full((rows, columns), UNKNOWN, dtype=np.int8)
+    depths = np.zeros((rows, columns))
     missing = np.zeros(solids.shape[0], dtype=np.int64)
     for i in range(rows):
         row_sum, row_count = 0.0, 0
@@ -103,6 +114,7 @@ def residuals_of(
             predicted, body, _ = raycast_any(solids, u, v)
             seen = float(image.inverse_depth[top + i, left + j])
             if body >= 0 and image.farthest <= predicted <= image.nearest:
+                depths[i, j] = 1.0 / predicted
                 residual = (seen - predicted) / predicted**2
                 if seen <= 0.0:
                     missing[body] += not may_hide(
@@ -116,7 +128,7 @@ def residuals_of(
                     missing[body] += residual < 0.0
             sums[i + 1, j + 1] = sums[i, j + 1] + row_sum
             counts[i + 1, j + 1] = counts[i, j + 1] + row_count
-    return Residuals(bodies, sums, counts, missing)
+    return Residuals(bodies, depths, sums, counts, missing)
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,8 +144,13 @@ def _mean(residuals: Residuals, row: int, column: int, radius: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _compare(residuals: Residuals, body: int, distinct: float, radius: int) -> tuple[int, int]:
+def _compare(
+    residuals: Residuals, body: int, distinct: float, radius: int, frayed: int
+) -> tuple[int, int]:
     """Return how many pixels of a body do not show it, and in how many others something stands out.
+
+    Pixels are not judged if the model's own depth is another one ``frayed`` pixels beside them: a
+    sensor may look there.
 
     Depths are averaged over a square, since a single one may be off by as much as the body stands
     out. Noise lets as many pixels stand out as lie behind, which are subtracted.
@@ -146,11 +163,24 @@ def _compare(residuals: Residuals, body: int, distinct: float, radius: int) -> t
             if entered == UNKNOWN:
                 continue
             mean = _mean(residuals, i, j, radius)
+            if abs(mean) <= distinct or _changes(residuals.depths, i, j, frayed, distinct):
+                continue
             if entered == body:
-                missing += mean < -distinct
-            elif abs(mean) > distinct:
+                missing += mean < 0.0
+            else:
                 unexplained += 1 if mean > 0.0 else -1
     return missing, unexplained
+
+
+@njit(cache=True, error_model="numpy")
+def _changes(depths: NDArray[np.float64], i: int, j: int, reach: int, distinct: float) -> bool:
+    """Return whether the model's depth changes by ``distinct`` metres within ``reach`` pixels."""
+    rows, columns = depths.shape
+    for row in range(max(i - reach, 0), min(i + reach + 1, rows)):
+        for column in range(max(j - reach, 0), min(j + reach + 1, columns)):
+            if depths[row, column] > 0.0 and abs(depths[row, column] - depths[i, j]) > distinct:
+                return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,6 +18,8 @@ class SupportSettings(NamedTuple):
     distinct
         Averaged depths that differ by more show something else, as a fraction of how far the body
         stands out.
+    frayed
+        A pixel may show what is this far beside it, in units of the lateral noise.
     max_missing
         Maximum fraction of its pixels that may show what is behind it.
     max_unexplained
@@ -35,6 +37,7 @@ class SupportSettings(NamedTuple):
 
     averaged: Fraction
     distinct: Fraction
+    frayed: NonNegative
     max_missing: Fraction
     max_unexplained: NonNegative
     min_pixels: Count
@@ -42,3 +45,35 @@ class SupportSettings(NamedTuple):
     relief_radius: Count
     max_relief: Fraction
     something_else: Positive
+
+
+class CurvatureSettings(NamedTuple):
+    """When a face that the model has flat is curved.
+
+    Attributes
+    ----------
+    pixels
+        Approximate number of observed pixels that are looked at.
+    min_pixels
+        A face that shows fewer is not judged.
+    border, reach
+        Points closer to the face's border than this, or further from its plane, are left out,
+        metres.
+    slope
+        Ratio of how far the parabola through the points leaves its plane to half its width, from
+        which on the face is curved. A can's is about 0.4.
+    rise
+        How far it must leave the plane, metres.
+    sure, correlated
+        Standard deviations of the parabola by which it must differ from a flat face, if so many
+        neighbouring pixels count as one measurement.
+    """
+
+    pixels: Count
+    min_pixels: Count
+    border: NonNegative
+    reach: Positive
+    slope: Positive
+    rise: NonNegative
+    sure: NonNegative
+    correlated: Positive

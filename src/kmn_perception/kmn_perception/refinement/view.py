@@ -26,6 +26,7 @@ from kmn_perception.refinement.solids import (
 )
 
 MIN_DEPTH = 1e-3  # metres in front of the camera; edges are clipped there
+MIN_CREASE = 1e-9  # pixels; it is not 0, which stands for a step
 MIN_OFFSET = 1e-9  # of the camera from a face's plane, in sizes of the body
 
 
@@ -50,6 +51,10 @@ class ModelView(NamedTuple):
     faces
         (B, 12) the face beside each edge of the silhouette that the camera sees; -1 at edges that
         do not belong to the silhouette.
+    creases
+        (B, 12) where an edge touches another body, so that the depth has no step at it: half the
+        width in pixels of the narrow face that ends there. The step is that over the whole face;
+        line and ends are those of its middle, and the face is the one before it. Else 0.
     """
 
     solids: NDArray[np.float64]
@@ -58,13 +63,20 @@ class ModelView(NamedTuple):
     line_jacobians: NDArray[np.float64]
     ends: NDArray[np.float64]
     faces: NDArray[np.int64]
+    creases: NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
 def model_view(
-    shape: Shape, values: NDArray[np.float64], projection: NDArray[np.float64]
+    shape: Shape, values: NDArray[np.float64], projection: NDArray[np.float64], contact: float
 ) -> ModelView:
-    """Return the model at ``values`` (P,) as a camera with a projection (3, 4) sees it."""
+    """Return the model at ``values`` (P,) as a camera with a projection (3, 4) sees it.
+
+    Parameters
+    ----------
+    contact
+        An edge this close to another body touches it, metres.
+    """
     cubes, cube_jacobians = cuboids(shape, values)
     bodies, parameters = cubes.shape[0], values.shape[0]
     view = ModelView(
@@ -74,6 +86,7 @@ def model_view(
         np.zeros((bodies, 12, 3, parameters)),
         np.zeros((bodies, 12, 4)),
         np.full((bodies, 12), -1),
+        np.zeros((bodies, 12)),
     )
     for body in range(bodies):
         cube, jacobian = np.zeros((3, 4)), np.zeros((3, 4, parameters))
@@ -83,7 +96,10 @@ def model_view(
                 cube[row] += projection[row, k] * cubes[body, k]
                 jacobian[row] += projection[row, k] * cube_jacobians[body, k]
         _see_faces(view, body, cube, jacobian)
-        _see_edges(view, body, cube, jacobian)
+        touching = np.zeros(12, dtype=np.bool_)
+        for edge in range(12):
+            touching[edge] = _touches(cubes, body, edge, contact)
+        _see_edges(view, body, cube, jacobian, touching)
         _bound(view.solids[body], cube)
     return view
 
@@ -129,19 +145,29 @@ def _see_edges(
     body: int,
     cube: NDArray[np.float64],
     jacobian: NDArray[np.float64],
+    touching: NDArray[np.bool_],
 ) -> None:
     """Fill in the body's silhouette: edges between a face that is seen and one that is not."""
     for edge in range(12):
         axis, first, second = edge // 4, (edge // 4 + 1) % 3, (edge // 4 + 2) % 3
-        low, high = (edge // 2) % 2, edge % 2
-        face, hidden = 2 * first + low, 2 * second + high
+        at_first, at_second = (edge // 2) % 2 - 0.5, edge % 2 - 0.5
+        face, hidden = 2 * first + (edge // 2) % 2, 2 * second + edge % 2
         if faces_camera(view.solids, body, face) == faces_camera(view.solids, body, hidden):
             continue
         if faces_camera(view.solids, body, hidden):
-            face = hidden
-        start = cube[:, 3] + (low - 0.5) * cube[:, first] + (high - 0.5) * cube[:, second]
+            face, hidden = hidden, face
+        end = cube[:, 3] + at_first * cube[:, first] + at_second * cube[:, second]
+        before = hidden ^ 1  # the face opposite to the hidden one
+        crease = touching[edge] and faces_camera(view.solids, body, before)
+        if crease:
+            face = before
+            if hidden // 2 == first:
+                at_first = 0.0
+            else:
+                at_second = 0.0
+        start = cube[:, 3] + at_first * cube[:, first] + at_second * cube[:, second]
         start_jacobian = (
-            jacobian[:, 3] + (low - 0.5) * jacobian[:, first] + (high - 0.5) * jacobian[:, second]
+            jacobian[:, 3] + at_first * jacobian[:, first] + at_second * jacobian[:, second]
         )
         direction, direction_jacobian = cube[:, axis], jacobian[:, axis]
         if not _ends(view.ends[body, edge], start, direction):
@@ -152,6 +178,8 @@ def _see_edges(
         if (line * inside).sum() < 0.0:
             length = -length
         line /= length
+        if crease:
+            view.creases[body, edge] = max(abs((line * end).sum() / end[2]), MIN_CREASE)
         view.lines[body, edge] = line
         view.faces[body, edge] = face
         for i in range(jacobian.shape[2]):
@@ -161,6 +189,27 @@ def _see_edges(
             derivative /= length
             stretch = line[0] * derivative[0] + line[1] * derivative[1]
             view.line_jacobians[body, edge, :, i] = derivative - stretch * line
+
+
+@njit(cache=True, error_model="numpy")
+def _touches(cubes: NDArray[np.float64], body: int, edge: int, contact: float) -> bool:
+    """Return whether the middle of an edge is in, or within ``contact`` metres of, another body."""
+    axis = edge // 4
+    middle = cubes[body, :, 3].copy()
+    middle += ((edge // 2) % 2 - 0.5) * cubes[body, :, (axis + 1) % 3]
+    middle += (edge % 2 - 0.5) * cubes[body, :, (axis + 2) % 3]
+    for other in range(cubes.shape[0]):
+        if other == body:
+            continue
+        outside = -np.inf
+        for k in range(3):
+            side = cubes[other, :, k]
+            length = np.sqrt((side * side).sum())
+            along = abs((side * (middle - cubes[other, :, 3])).sum()) / length
+            outside = max(outside, along - 0.5 * length)
+        if outside <= contact:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,8 +18,13 @@ ROLLS = {  # how a camera may be mounted: x and y of its optical frame when it i
 
 
 class CameraPose(str, Enum):
-    """Where the pose of the camera in the world comes from."""
+    """Where the pose of the camera in the world comes from.
 
+    With ``AUTO`` it is that of the view where it has one, else the canonical one.
+    """
+
+    AUTO = "auto"
+    TF = "tf"
     CANONICAL = "canonical"
     GIVEN = "given"
     SUPPORT_PLANE = "support_plane"
@@ -48,10 +53,12 @@ def find_camera_pose(
     NoCameraPoseError
         If it is to be found from the support plane, and there is none.
     """
-    if view.in_world or source is CameraPose.CANONICAL:
-        return canonical
-    if source is CameraPose.GIVEN:
+    if view.pose is not None and not view.in_world:
+        return view.pose
+    if source is CameraPose.GIVEN and not view.in_world:
         return given
+    if view.in_world or source is not CameraPose.SUPPORT_PLANE:
+        return canonical
     plane = find_support_plane(view.points, plane_settings)
     if plane is None:
         raise NoCameraPoseError(_why_no_plane(view.points, plane_settings))

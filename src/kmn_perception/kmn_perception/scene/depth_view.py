@@ -33,6 +33,8 @@ class DepthView:
         Time of the exposure, nanoseconds.
     intensity
         (height, width) grey values of the same pixels, 0 to 1, if there are any.
+    pose
+        (4, 4) of their frame in the world frame, where it came with them.
     """
 
     points: NDArray[np.float32]
@@ -41,6 +43,7 @@ class DepthView:
     frame: str = ""
     stamp: int = 0
     intensity: NDArray[np.float32] | None = None
+    pose: NDArray[np.float64] | None = None
 
     @classmethod
     def of_depth(cls, depth: NDArray[np.float32], camera: Camera) -> DepthView:

@@ -52,6 +52,32 @@ class StackingSettings:
     overlap: Fraction
 
 
+class StandingSettings(NamedTuple):
+    """When an object is seen to stand on the support plane, or on another object.
+
+    Attributes
+    ----------
+    gap
+        Unmeasured pixels below an object's lowest one, at most, beyond which is what it stands on.
+    reach
+        Distance at most of this from the object's lowest point, metres.
+    base
+        Height above the support's points of the lowest point of what stands on it, at most, metres.
+    min_supported, min_touching
+        Share of the columns in which it must be seen to stand on the support; and, if in fewer,
+        that of the columns in which it touches something else, from which on it stands on that.
+    border
+        Pixels beside an object within which what stands on it tells nothing of where it ends.
+    """
+
+    gap: Annotated[int, Field(ge=0)]
+    reach: NonNegative
+    base: NonNegative
+    min_supported: Fraction
+    min_touching: Fraction
+    border: Count
+
+
 @dataclass(frozen=True)
 class IntrinsicsSettings:
     """How the camera of a cloud is found from its points.
@@ -135,6 +161,7 @@ class SceneSettings:
     concave_edges: ConcaveEdgeSettings
     occlusion: OcclusionSettings
     stacking: StackingSettings
+    standing: StandingSettings
     intrinsics: IntrinsicsSettings
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Numbers for objects that stay the same from frame to frame, while the camera rests."""
+"""Numbers for objects that stay the same from frame to frame, by where they are in the world."""
 
 from __future__ import annotations
 

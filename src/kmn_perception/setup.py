@@ -37,6 +37,7 @@ setup(
         *shared("config"),
         *shared("data"),
         *shared("environment"),
+        *shared("launch"),
         *shared("weights"),
     ],
     zip_safe=False,

@@ -24,7 +24,7 @@ from kmn_perception.model.room_model import HINGE, OPENING, RoomModel
 from kmn_perception.model.surface_distance import surface_distances
 from kmn_perception.model.transformation import transform_points
 from kmn_perception.pipeline_interface import CalibrationState, ObjectEstimate, PipelineSettings
-from kmn_perception.scene.camera_pose import CameraPose
+from kmn_perception.scene.camera_pose import CameraPose, find_camera_pose
 from kmn_perception.scene.depth_view import DepthView
 
 STATUSES = {
@@ -154,9 +154,10 @@ class DoorPipeline:
     def _known_pose(self, view: DepthView) -> NDArray[np.float64] | None:
         """Return the pose (4, 4) of the camera if it is known without the floor in view."""
         source = self.settings.camera_pose
-        if view.in_world or source is CameraPose.CANONICAL:
-            return self.model.camera.pose
-        return self.settings.given_pose if source is CameraPose.GIVEN else None
+        if source is CameraPose.SUPPORT_PLANE and view.pose is None and not view.in_world:
+            return None
+        given, canonical = self.settings.given_pose, self.model.camera.pose
+        return find_camera_pose(view, source, given, canonical, self.settings.plane)
 
     def _none(self, view: DepthView, reason: str, sensor_error: str = "") -> ObjectEstimate:
         """Return what a frame without a door holds."""

@@ -19,6 +19,7 @@ from kmn_perception.network import weights
 from kmn_perception.network.morph import predict
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.refinement import RefinementSettings, refine
+from kmn_perception.refinement.calibration import calibration_covariance
 
 
 class Status(IntEnum):
@@ -53,6 +54,11 @@ class EstimatorSettings:
         Share of the points that must lie within it, whatever the others show.
     limit_margin
         By how much of its range a parameter may lie beyond its limits.
+    shape_error
+        Standard deviation by which faces and edges of the object lie off those of the model,
+        metres.
+    calibration_error
+        Standard deviation of the share by which depths and focal lengths are wrong.
     refine
         Fit the model to the observation after the predictions.
     """
@@ -64,6 +70,8 @@ class EstimatorSettings:
     max_deviation: float
     deviation_share: float
     limit_margin: float
+    shape_error: float
+    calibration_error: float
     refine: bool
 
 
@@ -162,7 +170,7 @@ class MorphEstimator:
     def load(
         cls, model: str | Path, weights_file: str | Path, settings: EstimatorSettings
     ) -> MorphEstimator:
-        """Load a model and its weights; an empty ``weights_file`` means the shipped ones.
+        """Load a model and its weights; where no file is told, those of `default_file`.
 
         Raises
         ------
@@ -172,7 +180,7 @@ class MorphEstimator:
             If the weights are missing, corrupt, or of another model.
         """
         kinematic_model = KinematicModel.load(model)
-        file = weights_file or kinematic_model.name
+        file = weights_file or weights.default_file(kinematic_model)
         network = weights.load(file, kinematic_model).network
         return cls(kinematic_model, network, settings, RefinementSettings.load())
 
@@ -221,8 +229,12 @@ class MorphEstimator:
         model, points = self.model, observation.points
         covariance: NDArray[np.float64] = np.full((len(values),) * 2, np.nan)
         if self.settings.refine:
-            fit = refine(model, observation, values, self.refinement)
-            values, covariance, doubt = fit.values, fit.covariance, fit.reason
+            fit = refine(model, observation, values, self.refinement, self.settings.shape_error)
+            values, doubt = fit.values, fit.reason
+            calibration = self.settings.calibration_error
+            covariance = fit.covariance + calibration_covariance(
+                model, values, observation.camera, calibration
+            )
         else:
             doubt = self._doubt(change)
         theta, gamma = model.split(values)

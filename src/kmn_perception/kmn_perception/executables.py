@@ -8,11 +8,13 @@ EXECUTABLES = {
     "demo_bag": ("kmn_perception.bags.demo", ""),
     "train": ("kmn_perception.training.train", "training"),
     "train_doors": ("kmn_perception.training.train_doors", "training"),
+    "draw_model": ("kmn_perception.visualization.draw_model", ""),
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "evaluate_fusion": ("kmn_perception.evaluation.doors.evaluate_fusion", ""),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
+    "model_schema": ("kmn_perception.model.model_schema", ""),
     "benchmark": ("kmn_perception.benchmark", ""),
 }

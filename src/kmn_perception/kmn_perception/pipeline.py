@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
-from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
@@ -19,32 +18,16 @@ from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError, find_camera_pose
 from kmn_perception.scene.connected_pixels import share_of_holes
 from kmn_perception.scene.depth_view import DepthView
-from kmn_perception.scene.free_space import free_space, free_space_of_cloud, is_truncated
-from kmn_perception.scene.intrinsics import camera_as_dense
+from kmn_perception.scene.free_space import free_space, is_truncated
+from kmn_perception.scene.object_view import ObjectView, observe_cloud, observe_image
 from kmn_perception.scene.occlusion import find_occluded_pairs
-from kmn_perception.scene.segmentation import Segments, segment
+from kmn_perception.scene.segmentation import segment
 from kmn_perception.scene.stacking import stands_on
+from kmn_perception.scene.standing import Standing, find_standing
 from kmn_perception.scene.support_plane import find_support_plane
 
 MIN_PARTS = 3  # two parts of an object, and what is in front of them
-
-
-class ObjectView(NamedTuple):
-    """What is seen of an object.
-
-    Attributes
-    ----------
-    observation
-        Its points, and what is known around them.
-    mask
-        (height, width), or (N,) for unorganised points: which ones they are.
-    truncated
-        The object goes on where nothing is seen: beyond the image's border.
-    """
-
-    observation: Observation
-    mask: NDArray[np.bool_]
-    truncated: bool
+TOGETHER = 4  # objects that are predicted at once, between two looks at the clock
 
 
 class MorphPipeline:
@@ -88,6 +71,7 @@ class MorphPipeline:
         around = free_space(points, labels, np.eye(4), model.camera.pose, 0.0, 0, (0.0, 0.0))
         mask = np.isfinite(points[..., 2])
         share_of_holes(points, labels, 1, scene.max_gap)
+        find_standing(points, labels, 1, np.array([0.0, 1.0]), 0.0, scene.standing)
         is_truncated(mask, around.free_depth)
         find_occluded_pairs([mask], around.free_depth, scene.occlusion.min_rows)
         self.estimator.warm_up()
@@ -101,18 +85,21 @@ class MorphPipeline:
     ) -> list[ObjectEstimate]:
         """Estimate the morphing parameters of ``max_objects`` or all objects, the nearest first.
 
+        What the budget of a frame does not allow for is left out, and says so.
+
         Returns
         -------
         objects
             One or more: where there is no object, a single one says why.
         """
+        end = time.monotonic() + self.settings.budget.seconds
         try:
             views, reason = self.observe(view, max_objects), "no points of an object"
         except NoCameraPoseError as error:
             views, reason = [], str(error)
         if not views:
             return [self._nothing(view, reason)]
-        objects = self._joined(self._estimated(views))
+        objects = self._joined(self._estimated(views, end), end)
         return [self._unless_stacked(found, objects) for found in objects]
 
     def observe(self, view: DepthView, max_objects: int | None = None) -> list[ObjectView]:
@@ -135,53 +122,9 @@ class MorphPipeline:
         labels = np.argsort(too_small, kind="stable")[:max_objects].tolist()
         floor = background.plane_margin if background.remove_plane else -np.inf
         if view.camera is None:
-            return [self._observe_cloud(segments, label, pose, floor) for label in labels]
-        return self._observe_image(view, view.camera, segments, labels, to_world, floor)
-
-    def _observe_image(
-        self,
-        view: DepthView,
-        camera: Camera,
-        segments: Segments,
-        labels: Sequence[int],
-        to_world: NDArray[np.float64],
-        floor: float,
-    ) -> list[ObjectView]:
-        """Return what is seen of objects in the pixels of a camera."""
-        image = segments.labels.reshape(view.points.shape[:-1])
-        to_camera = camera.world_to_camera @ to_world
-        scene = self.settings.scene
-        shadow = camera.fx * scene.shadow.baseline, scene.shadow.slack
-        around = free_space(
-            view.points, image, to_camera, to_world, floor, scene.border_run, shadow
-        )
-        holes = share_of_holes(view.points, image, segments.objects, scene.max_gap)
-        depth = view.depth()
-        views = []
-        for label in labels:
-            mask = image == label
-            if holes[label] > 1.0 - scene.intrinsics.dense:
-                observation = self._sparse(segments, label, camera, floor)
-            else:
-                seen = np.where(mask, depth, np.float32(np.nan))
-                observation = Observation(segments.of_object(label), camera, floor, around, seen)
-            views.append(ObjectView(observation, mask, is_truncated(mask, around.free_depth)))
-        return views
-
-    def _observe_cloud(
-        self, segments: Segments, label: int, pose: NDArray[np.float64], floor: float
-    ) -> ObjectView:
-        """Return what is seen of an object among unorganised points, in the canonical view."""
-        canonical = replace(self.estimator.model.camera, pose=pose)
-        observation = self._sparse(segments, label, canonical, floor)
-        return ObjectView(observation, segments.labels == label, False)
-
-    def _sparse(self, segments: Segments, label: int, camera: Camera, floor: float) -> Observation:
-        """Return what a camera of as many pixels as the points are dense sees of an object."""
-        seen = segments.of_object(label)
-        sensor = camera_as_dense(seen, camera, self.settings.scene.intrinsics)
-        beside = free_space_of_cloud(segments.points, sensor, floor)
-        return Observation(seen, sensor, floor, beside)
+            canonical = replace(self.model.camera, pose=pose)
+            return [observe_cloud(segments, label, canonical, floor, scene) for label in labels]
+        return observe_image(view, view.camera, segments, labels, to_world, floor, scene)
 
     def camera_pose(self, view: DepthView) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the optical frame in the world, see `find_camera_pose`."""
@@ -196,13 +139,28 @@ class MorphPipeline:
         empty = Observation(np.empty((0, 3), np.float32), model.camera)
         return ObjectEstimate(none, empty, np.zeros_like(view.valid), False)
 
-    def _estimated(self, views: Sequence[ObjectView]) -> list[ObjectEstimate]:
-        estimates = self.estimator.estimate_all([view.observation for view in views])
-        return [
-            ObjectEstimate(estimate, *view) for estimate, view in zip(estimates, views, strict=True)
-        ]
+    def _estimated(self, views: Sequence[ObjectView], end: float) -> list[ObjectEstimate]:
+        """Estimate the objects one after another, as many as the budget of the frame allows for."""
+        budget, objects = self.settings.budget, list[ObjectEstimate]()
+        for first in range(0, min(len(views), budget.objects), TOGETHER):
+            if first > 0 and time.monotonic() > end:
+                break
+            some = views[first : min(first + TOGETHER, budget.objects)]
+            estimates = self.estimator.estimate_all([view.observation for view in some])
+            objects += [ObjectEstimate(e, *view) for e, view in zip(estimates, some, strict=True)]
+        reason = f"{len(objects)} of {len(views)} objects were estimated"
+        return objects + [self._left_out(view, reason) for view in views[len(objects) :]]
 
-    def _joined(self, objects: list[ObjectEstimate]) -> list[ObjectEstimate]:
+    def _left_out(self, view: ObjectView, why: str) -> ObjectEstimate:
+        """Return an object for which the budget of the frame did not suffice."""
+        count, budget = len(view.observation.points), self.settings.budget
+        if count < self.estimator.settings.min_points:  # costs nothing
+            return ObjectEstimate(self.estimator.estimate(view.observation), *view)
+        reason = f"left out: {why}, a frame has {budget.seconds:g} s for {budget.objects} objects"
+        none = Estimate.none(self.model, count, Status.NOT_CONVERGED, reason)
+        return ObjectEstimate(none, *view, left_out=True)
+
+    def _joined(self, objects: list[ObjectEstimate], end: float) -> list[ObjectEstimate]:
         """Join what an occluder divides in the image, if one model explains both parts."""
         around = objects[0].observation.free_space
         sparse = any(found.observation.depth is None for found in objects)
@@ -216,19 +174,31 @@ class MorphPipeline:
         )
         for a, b in pairs:
             first, second = sorted((owner[a], owner[b]))
-            whole = None if first == second else self._as_one(objects[first], objects[second])
+            if first == second or not self._may_be_one(objects[first], objects[second]):
+                continue
+            if time.monotonic() > end:
+                for part in (first, second):
+                    view = ObjectView(*objects[part][1:5])
+                    objects[part] = self._left_out(view, "it may be a part of another one")
+                continue
+            whole = self._as_one(objects[first], objects[second])
             if whole is not None:
                 objects = [whole if i == first else found for i, found in enumerate(objects)]
                 owner = [first if i == second else i for i in owner]
         return [found for i, found in enumerate(objects) if owner[i] == i]
 
-    def _as_one(self, a: ObjectEstimate, b: ObjectEstimate) -> ObjectEstimate | None:
-        """Return two objects as one, if their tops are level and one model explains both."""
+    def _may_be_one(self, a: ObjectEstimate, b: ObjectEstimate) -> bool:
+        """Return whether the tops of two objects, of which none is left out, are level."""
+        if a.left_out or b.left_out:
+            return False
         settings = self.settings.scene.occlusion
+        seen = a.observation.points, b.observation.points
+        heights = [np.quantile(points[:, 2], settings.top) for points in seen]
+        return bool(abs(heights[0] - heights[1]) <= settings.same_height)
+
+    def _as_one(self, a: ObjectEstimate, b: ObjectEstimate) -> ObjectEstimate | None:
+        """Return two objects as one, if one model explains both."""
         first, second = a.observation, b.observation
-        heights = [np.quantile(seen.points[:, 2], settings.top) for seen in (first, second)]
-        if abs(heights[0] - heights[1]) > settings.same_height:
-            return None
         assert first.depth is not None and second.depth is not None
         observation = replace(
             first,
@@ -238,21 +208,27 @@ class MorphPipeline:
         estimate = self.estimator.estimate(observation)
         if estimate.status is not Status.OK:
             return None
-        return ObjectEstimate(estimate, observation, a.mask | b.mask, a.truncated or b.truncated)
+        standing = min(a.standing, b.standing)
+        truncated = a.truncated or b.truncated
+        return ObjectEstimate(estimate, observation, a.mask | b.mask, truncated, standing)
 
     def _unless_stacked(
         self, found: ObjectEstimate, objects: Sequence[ObjectEstimate]
     ) -> ObjectEstimate:
-        """Refuse the estimate of an object that stands on another one."""
-        points, cubes = found.observation.points, self._found_bodies(found)
+        """Refuse the estimate of an object that stands on another one, whatever that is."""
+        points, cubes = found.observation.points, self._likely_bodies(found)
         stacking = self.settings.scene.stacking
-        for other in objects:
-            if other is not found and stands_on(points, cubes, self._found_bodies(other), stacking):
-                reason = "the object stands on another one, not on the support plane"
-                status = Status.NOT_CONVERGED
-                return found._replace(
-                    estimate=replace(found.estimate, status=status, reason=reason, converged=False)
+        if found.standing is Standing.OBJECT or any(
+            other is not found and stands_on(points, cubes, self._likely_bodies(other), stacking)
+            for other in objects
+        ):
+            estimate = found.estimate
+            reason = "the object stands on another one, not on the support plane"
+            if estimate.status is Status.OK:
+                estimate = replace(
+                    estimate, status=Status.NOT_CONVERGED, reason=reason, converged=False
                 )
+            return found._replace(estimate=estimate)
         return found
 
     def bodies(self, estimate: Estimate) -> NDArray[np.float64]:
@@ -261,7 +237,8 @@ class MorphPipeline:
             return np.empty((0, 4, 4))
         return self.model.unit_cubes(estimate.theta, estimate.gamma)
 
-    def _found_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
-        """Return the bodies (B, 4, 4) of an estimate that holds, else none."""
-        holds = found.estimate.status is Status.OK
-        return self.bodies(found.estimate) if holds else np.empty((0, 4, 4))
+    def _likely_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
+        """Return the bodies (B, 4, 4) of an estimate that lies on the points, OK or not."""
+        estimate = found.estimate
+        likely = estimate.residual <= self.estimator.settings.max_residual
+        return self.bodies(estimate) if likely else np.empty((0, 4, 4))

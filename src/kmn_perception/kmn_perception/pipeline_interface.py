@@ -17,6 +17,7 @@ from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.depth_view import DepthView
 from kmn_perception.scene.segmentation import SegmentationSettings
 from kmn_perception.scene.settings import SceneSettings
+from kmn_perception.scene.standing import Standing
 from kmn_perception.scene.support_plane import SupportPlaneSettings
 
 
@@ -27,6 +28,21 @@ class CalibrationState(Enum):
     CALIBRATED = "calibrated"
 
 
+class FrameBudget(NamedTuple):
+    """What a frame of single objects may cost.
+
+    Attributes
+    ----------
+    objects
+        Number that is estimated at most, the nearest ones.
+    seconds
+        After which no other one is begun.
+    """
+
+    objects: int
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False)
 class PipelineSettings:
     """How a frame becomes objects in the world frame.
@@ -34,7 +50,8 @@ class PipelineSettings:
     Attributes
     ----------
     camera_pose
-        The model's canonical one, the given one, or estimated from the support plane.
+        The view's own, the model's canonical one, the given one, or estimated from the support
+        plane.
     given_pose
         (4, 4) optical frame in the world frame, metres.
     plane
@@ -45,6 +62,8 @@ class PipelineSettings:
         How objects are told apart.
     calibration
         Of the depth camera; counts for doors in walls.
+    budget
+        Of a frame of single objects.
     """
 
     camera_pose: CameraPose
@@ -53,6 +72,7 @@ class PipelineSettings:
     background: SegmentationSettings
     scene: SceneSettings
     calibration: CalibrationState
+    budget: FrameBudget
 
 
 class ObjectEstimate(NamedTuple):
@@ -68,12 +88,18 @@ class ObjectEstimate(NamedTuple):
         (height, width), or (N,) for unorganised points: which ones they are.
     truncated
         The object goes on where nothing is seen: beyond the image's border.
+    standing
+        What it is seen to stand on.
+    left_out
+        The budget of the frame did not suffice for it.
     """
 
     estimate: Estimate
     observation: Observation
     mask: NDArray[np.bool_]
     truncated: bool
+    standing: Standing = Standing.UNSEEN
+    left_out: bool = False
 
 
 class Pipeline(Protocol):

@@ -120,6 +120,14 @@ def test_the_command_line_chooses_the_settings_of_a_design() -> None:
     assert train.settings_of(options) == load_training_settings("paper/door")
 
 
+@pytest.mark.parametrize("model", ["drawer", "some/where/mine.yaml"])
+def test_a_model_without_settings_of_its_own_is_trained_by_those_for_any(model: str) -> None:
+    options = train.arguments(["--model", model, "--out", "w", "--seed", "7"])
+    assert train.settings_of(options) == load_training_settings("default", {"seed": 7})
+    options = train.arguments(["--model", model, "--config", "box_c", "--out", "w"])
+    assert train.settings_of(options) == load_training_settings("box_c")
+
+
 def test_settings_of_another_design_are_refused() -> None:
     with pytest.raises(ConfigurationError, match="box_a.yaml: key 'augmentation' is missing"):
         load_training_settings("box_a", {"network": "paper"})

@@ -17,6 +17,8 @@ SETTINGS = EstimatorSettings(
     max_deviation=0.1,
     deviation_share=0.9,
     limit_margin=0.1,
+    shape_error=0.0,
+    calibration_error=0.0,
     refine=True,
 )
 

@@ -100,6 +100,9 @@ def test_the_written_errors_are_those_of_known_predictions(
         assert found["per_parameter"] == pytest.approx(
             dict(zip("xy", errors[counted].mean(axis=0), strict=True)), abs=1e-6
         )
+        assert found["per_parameter_median"] == pytest.approx(
+            dict(zip("xy", np.median(errors[counted], axis=0), strict=True)), abs=1e-6
+        )
         assert found["mean"] == pytest.approx(sums[counted].mean(), abs=1e-6)
         assert found["median"] == pytest.approx(np.median(sums[counted]), abs=1e-6)
         assert found["p95"] == pytest.approx(np.quantile(sums[counted], 0.95), abs=1e-6)
@@ -116,7 +119,8 @@ def test_every_method_has_a_row_for_every_model(tmp_path: Path, name: str) -> No
     count = len(KinematicModel.load(name).parameters)
     paper = save_constant(tmp_path / "paper.safetensors", name, [0.1] * count, [0.1] * count)
     own = save_constant(tmp_path / "own.safetensors", name, [0.0] * count)
-    result = run(tmp_path, name, "--samples", "3", "--weights", own, "--paper-weights", paper)
+    trained = ("--weights", own, "--paper-weights", paper)
+    result = run(tmp_path, name, "--samples", "3", "--peers", *trained)
     methods = result["methods"]
     assert list(methods) == [
         "baseline", "kmn_paper", "kmn", "kmn_refined", "multistart",
@@ -137,7 +141,7 @@ def test_every_method_has_a_row_for_every_model(tmp_path: Path, name: str) -> No
 
 def test_slow_peers_are_measured_on_fewer_samples_unless_they_are_asked_for() -> None:
     few = dataclasses.replace(SETTINGS, peer_samples=2)
-    methods = evaluate(Request("box_a", seed=0), 4, 1, few)["methods"]
+    methods = evaluate(Request("box_a", seed=0, peers=True), 4, 1, few)["methods"]
     counts = {name: methods[name]["samples"] for name in ("kmn_paper", "icp", "information_limit")}
     assert counts == {"kmn_paper": 4, "icp": 2, "information_limit": 4}
     methods = evaluate(Request("box_a", seed=0, methods=("small_gicp",)), 4, 1, few)["methods"]
@@ -151,7 +155,7 @@ def test_rows_without_weights_are_left_out_with_a_line(
     file = tmp_path / "carton.yaml"
     shipped = resources.find("config/models", "box_a").read_text()
     file.write_text(shipped.replace("name: box_a", "name: carton"))
-    result = run(tmp_path, str(file), "--samples", "2")
+    result = run(tmp_path, str(file), "--samples", "2", "--peers")
     assert list(result["methods"]) == [
         "multistart", "icp", "icp_identity", "icp_plane", "small_gicp", "information_limit",
     ]  # fmt: skip

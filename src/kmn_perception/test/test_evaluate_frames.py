@@ -7,7 +7,9 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -103,17 +105,46 @@ def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None
         check_frames(read_frames(tmp_path), SETTINGS)
 
 
-def test_frames_of_another_size_are_refused_with_both_sizes(tmp_path: Path) -> None:
-    _copy(tmp_path, 3)
-    for kind in "dl":
-        file = str(tmp_path / f"learn3_{kind}.png")
-        picture = cv2.imread(file, cv2.IMREAD_UNCHANGED)
+def _change(folder: Path, change: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
+    """Change the pictures of a frame."""
+    for file in folder.glob("learn3_?.png"):
+        picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
         assert picture is not None
-        cv2.imwrite(file, picture[::2, ::2])
+        cv2.imwrite(str(file), change(picture))
+
+
+@pytest.mark.parametrize("shape", ["coarser", "finer", "cropped"])
+def test_frames_of_any_size_are_evaluated(tmp_path: Path, shape: str) -> None:
+    """A crop is of another shape than the camera's image, so that it needs a camera of its own."""
+    _copy(tmp_path, 3)
+    if shape == "cropped":
+        _change(tmp_path, lambda picture: picture[40:, 60:])
+        camera = (share_directory() / "config/cameras/kinect_v1.yaml").read_text()
+        for old, new in (
+            ("width: 640", "width: 580"), ("height: 480", "height: 440"),
+            ("cx: 319.5", "cx: 259.5"), ("cy: 239.5", "cy: 199.5"),
+        ):  # fmt: skip
+            assert old in camera
+            camera = camera.replace(old, new)
+        (tmp_path / "camera.yaml").write_text(camera)
+    elif shape == "coarser":
+        _change(tmp_path, lambda picture: picture[::2, ::2])
+    else:
+        _change(tmp_path, lambda picture: picture.repeat(2, axis=0).repeat(2, axis=1))
+    done = _evaluate(tmp_path, "--json", tmp_path / "e.json", "--out", tmp_path / "pictures")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "e.json").read_text())
+    assert (result["objects"], result["found"], result["false_found"]) == (2, 2, 0)
+    assert result["size_error_m"]["median"] < 0.006
+
+
+def test_frames_of_another_shape_without_a_camera_are_refused_with_both(tmp_path: Path) -> None:
+    _change(_copy(tmp_path, 3), lambda picture: picture[:-30])
     done = _evaluate(tmp_path)
     assert done.returncode == 1
-    expected = "evaluate_frames: learn3: 320 x 240 pixels, expected the 640 x 480 of the experiment"
+    expected = "evaluate_frames: learn3: 640 x 450 pixels, expected the shape of 640 x 480, as"
     assert done.stderr.splitlines()[-1].startswith(expected)
+    assert "camera.yaml" in done.stderr
 
 
 @pytest.mark.parametrize(

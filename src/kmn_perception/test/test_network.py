@@ -41,7 +41,9 @@ def test_the_split_holds_the_depth_image() -> None:
     depth = torch.tensor([[[0.0, 0.004, 0.5, 1.0]]])
     covered, stretched = network.split(depth)[0]
     torch.testing.assert_close(covered, torch.tensor([[0.0, 1.0, 1.0, 1.0]]))
-    torch.testing.assert_close(covered / 2.0 + stretched / MODELS["door"].input.contrast, depth[0])
+    torch.testing.assert_close(
+        covered / 2.0 + stretched / MODELS["door"].depth_image.contrast, depth[0]
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -117,6 +117,25 @@ def test_an_estimate_that_is_off_shows_by_how_much() -> None:
     assert shift == pytest.approx(0.05 * window.camera.fx / depth, rel=0.1)
 
 
+def test_the_largest_body_gets_the_large_window_wherever_it_stands_in_the_file() -> None:
+    drawer = KinematicModel.load("drawer")
+    turned = replace(drawer, bodies=drawer.bodies[::-1])
+    margins, areas = CascadeSettings.load().margins[0], CascadeSettings.load().pixels
+    windows = {w.body: w.camera for w in Window.of_model(drawer, margins, areas)}
+    others = {w.body: w.camera for w in Window.of_model(turned, margins, areas)}
+    pixels = [windows[i].width * windows[i].height for i in range(3)]
+    assert pixels[0] == max(pixels)  # the cabinet's
+    lengths = [  # of the windows, in pixels of the canonical image
+        max(w.width / w.fx, w.height / w.fy) * drawer.camera.fx for w in windows.values()
+    ]
+    assert max(lengths) == pytest.approx(lengths[0])
+    for i, camera in windows.items():
+        other = others[2 - i]
+        assert (other.width, other.height, other.fx, other.cx) == (
+            camera.width, camera.height, camera.fx, camera.cx,
+        )  # fmt: skip
+
+
 def test_a_camera_that_does_not_see_a_body_is_refused() -> None:
     model = MODELS["door"]
     away = replace(model.camera, pose=look_at([-2.5, 0.0, 1.8], [-5.0, 0.0, 1.8]))

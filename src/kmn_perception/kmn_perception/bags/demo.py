@@ -29,7 +29,12 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.pipeline_interface import PipelineSettings
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
-from kmn_perception.ros.node_process import NoAnswerError, NodeProcess, ProcessClient
+from kmn_perception.ros.node_process import (
+    NoAnswerError,
+    NodeProcess,
+    ProcessClient,
+    namespace_arguments,
+)
 from kmn_perception.ros.parameters import declare_parameters
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_perception.scene.segmentation import segment
@@ -151,9 +156,9 @@ class Listener:
 def node_arguments() -> list[str]:
     """Return the ROS arguments for all boxes on a table, in a namespace of its own."""
     file = resources.find("config/nodes", "morph_node_tabletop")
-    alone = f"__ns:=/demo_{os.getpid()}"  # whatever else runs here is not disturbed
+    alone = namespace_arguments(f"/demo_{os.getpid()}")  # whatever else runs is not disturbed
     parameters = ["-p", "reliability:=reliable", "-p", "objects:=all"]
-    return ["--params-file", str(file), *parameters, "-r", alone]
+    return ["--params-file", str(file), *parameters, *alone]
 
 
 def estimate_frames(

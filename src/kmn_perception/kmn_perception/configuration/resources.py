@@ -17,7 +17,9 @@ def share_directory() -> Path:
     return Path(get_package_share_directory(PACKAGE))
 
 
-def find(kind: str, name_or_path: str | Path, suffix: str = ".yaml") -> Path:
+def find(
+    kind: str, name_or_path: str | Path, suffix: str = ".yaml", folder: Path | None = None
+) -> Path:
     """Return the file of a shipped name, or the user's own file.
 
     Parameters
@@ -28,17 +30,19 @@ def find(kind: str, name_or_path: str | Path, suffix: str = ".yaml") -> Path:
         A shipped name such as ``door``, or a path to a file.
     suffix
         Ending of the shipped files.
+    folder
+        From where a relative path leads; ``None``: from the working directory.
 
     Raises
     ------
     FileNotFoundError
         If there is neither a file at that path nor a shipped one of that name.
     """
-    folder = share_directory() / kind
-    for candidate in (Path(name_or_path), folder / f"{name_or_path}{suffix}"):
+    own, ours = (folder or Path()) / name_or_path, share_directory() / kind
+    for candidate in (own, ours / f"{name_or_path}{suffix}"):
         if candidate.is_file():
             return candidate
-    shipped = ", ".join(sorted(path.stem for path in folder.glob(f"*{suffix}"))) or "none"
+    shipped = ", ".join(sorted(path.stem for path in ours.glob(f"*{suffix}"))) or "none"
     raise FileNotFoundError(
         f"'{name_or_path}' is neither a file nor one of the shipped {kind} ({shipped})"
     )

@@ -48,7 +48,9 @@ class Request:
     seed, noise
         Of the samples; without noise they are seen as in training.
     methods
-        Names; ``None``: all for which the model has weights, the peers on fewer samples.
+        Names; ``None``: all for which the model has weights, but for the peers.
+    peers
+        With these as well, on fewer samples, where no methods are named.
     lenient
         Leave out named methods for which the model has no weights.
     weights, paper_weights
@@ -59,6 +61,7 @@ class Request:
     seed: int
     noise: str | None = None
     methods: tuple[str, ...] | None = None
+    peers: bool = False
     lenient: bool = False
     weights: str | None = None
     paper_weights: str | None = None
@@ -95,7 +98,8 @@ class Comparison:
     def __init__(self, request: Request, settings: EvaluationSettings) -> None:
         self.model = KinematicModel.load(request.model)
         self.networks = load_networks(self.model, request.weights, request.paper_weights)
-        names = NAMES if request.methods is None else request.methods
+        usual = NAMES if request.peers else [name for name in NAMES if name not in PEERS]
+        names = usual if request.methods is None else request.methods
         if request.noise not in (None, *NOISES):
             raise MethodError(
                 f"'{self.model.name}' is seen with the noise {', '.join(NOISES)}, "

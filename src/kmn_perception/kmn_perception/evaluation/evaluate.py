@@ -63,7 +63,15 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--weights", help="file for our network (default: the one shipped)")
     parser.add_argument("--paper-weights", help="file for the paper's network (default: shipped)")
     parser.add_argument(
-        "--methods", nargs="+", choices=(*NAMES, *ROOM_METHODS), help="default: all that apply"
+        "--methods",
+        nargs="+",
+        choices=(*NAMES, *ROOM_METHODS),
+        help="default: all that apply, but for the peers",
+    )
+    parser.add_argument(
+        "--peers",
+        action="store_true",
+        help="compare with the slow peers too: ICP, and the fit without a network",
     )
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     parser.add_argument(
@@ -158,6 +166,8 @@ def command(request: Request, samples: int) -> str:
         words += [option, value] if value else []
     if request.methods is not None:
         words += ["--methods", *request.methods]
+    if request.peers:
+        words.append("--peers")
     return f"./run kmn_perception evaluate {shlex.join(words)}"
 
 
@@ -181,6 +191,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             seed=options.seed,
             noise=options.noise,
             methods=options.methods and tuple(options.methods),
+            peers=options.peers,
             weights=options.weights,
             paper_weights=options.paper_weights,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 from kmn_perception.configuration import resources
@@ -30,7 +31,7 @@ class Networks(NamedTuple):
 def load_networks(
     model: KinematicModel, own: str | None = None, paper: str | None = None
 ) -> Networks:
-    """Read weights: files that are given, else those shipped for the model, if there are any.
+    """Read weights: files that are given, else those of the model, if there are any.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def load_networks(
     """
     hashes: dict[str, str] = {}
 
-    def load(role: str, given: str | None, shipped: str) -> Weights | WeightsError:
+    def load(role: str, given: str | None, shipped: str | Path) -> Weights | WeightsError:
         try:
             loaded = weights.load(given or shipped, model)
         except WeightsError as error:
@@ -51,5 +52,7 @@ def load_networks(
         return loaded
 
     return Networks(
-        load("paper", paper, f"paper/{model.name}"), load("own", own, model.name), hashes
+        load("paper", paper, f"paper/{model.name}"),
+        load("own", own, weights.default_file(model)),
+        hashes,
     )

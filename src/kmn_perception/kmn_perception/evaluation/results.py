@@ -122,7 +122,9 @@ def regenerate(options: argparse.Namespace) -> None:
     for noise in NOISES:
         for model in options.models:
             methods = None if noise == "none" else WITH_NOISE
-            request = Request(model, options.seed, noise, methods, lenient=True)
+            request = Request(
+                model, options.seed, noise, methods, peers=methods is None, lenient=True
+            )
             file = folder / f"{model}_{noise}.json"
             results[noise][model] = result_of(
                 request, options.samples, options.jobs, file, options.anew, settings

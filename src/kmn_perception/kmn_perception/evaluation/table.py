@@ -41,6 +41,7 @@ def report(result: dict[str, Any], paper: PaperErrors) -> str:
             "Mean of it after each step\n" + columns(_by_step(result)),
             "Mean of it by visible fraction\n" + columns(by_visible_fraction(result)),
             "Mean absolute error of each parameter\n" + columns(by_parameter(result, paper)),
+            "Median absolute error of each parameter\n" + columns(_medians(result)),
         ]
     )
 
@@ -86,6 +87,13 @@ def by_parameter(result: dict[str, Any], paper: PaperErrors) -> Rows:
     for name, errors in paper.items():
         rows.append([f"paper {name}", *[error(errors.get(parameter)) for parameter in names]])
     return rows
+
+
+def _medians(result: dict[str, Any]) -> Rows:
+    medians = {name: m["per_parameter_median"] for name, m in result["methods"].items()}
+    names = list(next(iter(medians.values())))
+    rows = [[name, *[error(of[parameter]) for parameter in names]] for name, of in medians.items()]
+    return [["method", *names], *rows]
 
 
 def error(value: float | None) -> str:

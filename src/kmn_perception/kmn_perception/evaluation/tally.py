@@ -37,7 +37,8 @@ class Tally:
         errors = np.stack([measurement.errors for measurement in self._measurements])
         sums = errors.sum(axis=2)
         result = sums[:, self._counted]
-        means = errors[:, self._counted].mean(axis=0)
+        counted = errors[:, self._counted]
+        means, medians = counted.mean(axis=0), np.median(counted, axis=0)
         names = [parameter.name for parameter in self._model.parameters]
         order = np.argsort(result, kind="stable")
         extremes = self._settings.extremes
@@ -45,6 +46,7 @@ class Tally:
             "samples": len(result),
             **_statistics(result),
             "per_parameter": dict(zip(names, means.tolist(), strict=True)),
+            "per_parameter_median": dict(zip(names, medians.tolist(), strict=True)),
             "by_step": sums.mean(axis=0).tolist(),
             "by_step_std": sums.std(axis=0).tolist(),
             "by_visible_fraction": self._by_visible_fraction(result),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -12,7 +13,12 @@ from kmn_perception.command_line.arguments import output_file, output_folder, wr
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.experiments.experiment import TABLETOP, FrameResult, load_pipeline, run
-from kmn_perception.experiments.labelled_frame import FrameError, check_frames, read_frames
+from kmn_perception.experiments.labelled_frame import (
+    FrameError,
+    check_frames,
+    read_camera,
+    read_frames,
+)
 from kmn_perception.experiments.pictures import draw
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.experiments.statistics import (
@@ -33,10 +39,11 @@ def evaluate(
 
     Raises
     ------
-    FrameError
-        If the folder's files are not as expected, or not of the camera's size.
+    FrameError, ConfigurationError
+        If the folder's files are not as expected, or not of the camera's shape.
     """
     frames = read_frames(folder)
+    settings = replace(settings, camera=read_camera(folder, settings))
     check_frames(frames, settings)
     progress = tqdm(run(frames, pipeline, settings), "frames", len(frames), unit="frame")
     return list(progress)
@@ -71,7 +78,7 @@ def _report(options: argparse.Namespace) -> None:
     print("", details(summary), sep="\n")
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        overlays = draw(results, pipeline.estimator.model, settings)
+        overlays = draw(results, pipeline.estimator.model)
         print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
     if options.json:
         write_json(options.json, summary)

@@ -97,7 +97,7 @@ def _run(
 ) -> FrameResult:
     model = pipeline.estimator.model
     references = measure(frame, settings, model.camera.pose)
-    view = DepthView.of_depth(frame.depth, settings.camera)
+    view = DepthView.of_depth(frame.depth, frame.camera(settings))
     objects, seconds = _estimate(view, pipeline, settings.repetitions)
     try:
         pose = pipeline.camera_pose(view)

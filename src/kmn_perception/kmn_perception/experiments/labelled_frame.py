@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.experiments.settings import ExperimentSettings
+from kmn_perception.model.camera import Camera
 from kmn_perception.model.depth_image import PictureError, read_depth_image, read_picture
 
+CAMERA_FILE = "camera.yaml"
 DEPTH_SUFFIX, LABEL_SUFFIX = "_d.png", "_l.png"
 TABLE, FIRST_OBJECT = 1, 2  # labels; 0 is the rest
 
@@ -39,21 +41,39 @@ class LabelledFrame:
     depth: NDArray[np.float32]
     labels: NDArray[np.uint8]
 
+    def camera(self, settings: ExperimentSettings) -> Camera:
+        """Return the camera that sees the experiment's view in as many pixels."""
+        height, width = self.depth.shape
+        return settings.camera.resized(width, height)
+
     @property
     def objects(self) -> list[int]:
         """The labels of the objects."""
         return [int(label) for label in np.unique(self.labels) if label >= FIRST_OBJECT]
 
 
+def read_camera(folder: Path, settings: ExperimentSettings) -> Camera:
+    """Return the camera of a folder's frames: of its own file, else that of the experiment.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file is wrong.
+    """
+    file = folder / CAMERA_FILE
+    return Camera.load(file) if file.is_file() else settings.camera
+
+
 def check_frames(frames: Sequence[LabelledFrame], settings: ExperimentSettings) -> None:
-    """Raise ``FrameError`` if a frame is not of the camera's size, or shows too little table."""
+    """Raise ``FrameError`` if a frame is not of the camera's shape, or shows too little table."""
     camera = settings.camera
     for frame in frames:
-        if frame.depth.shape != (camera.height, camera.width):
+        height, width = frame.depth.shape
+        if width * camera.height != height * camera.width:
             raise FrameError(
-                f"{frame.name}: {size_text(frame.depth.shape)} pixels, expected the "
-                f"{camera.width} x {camera.height} of the experiment's camera "
-                "(config/experiments.yaml)"
+                f"{frame.name}: {size_text(frame.depth.shape)} pixels, expected the shape of "
+                f"{camera.width} x {camera.height}, as the camera has; state that of other images "
+                f"in {CAMERA_FILE} beside them (config/cameras holds examples)"
             )
         table = int(((frame.labels == TABLE) & np.isfinite(frame.depth)).sum())
         if table < settings.min_table:

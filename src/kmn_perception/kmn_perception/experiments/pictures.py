@@ -10,22 +10,19 @@ from numpy.typing import NDArray
 
 from kmn_perception.estimator import Status
 from kmn_perception.experiments.experiment import FrameResult
-from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.pipeline_interface import ObjectEstimate
 from kmn_perception.visualization.overlay import Overlay, ShownObject
 
 
-def draw(
-    results: Sequence[FrameResult], model: KinematicModel, settings: ExperimentSettings
-) -> Iterator[Overlay]:
+def draw(results: Sequence[FrameResult], model: KinematicModel) -> Iterator[Overlay]:
     """Yield the picture of each frame: all objects, their estimates and their references."""
     for result in results:
         references = [s.reference.box.unit_cube for s in result.scores]
         found = sum(s.detection is not None for s in result.scores)
         yield Overlay(
             depth=result.frame.depth,
-            camera=replace(settings.camera, pose=result.pose),
+            camera=replace(result.references.camera, pose=result.pose),
             objects=[_show(found, model) for found in result.objects],
             title=f"{result.frame.name}: {found} of {len(references)} found",
             references=np.array(references).reshape(-1, 4, 4),

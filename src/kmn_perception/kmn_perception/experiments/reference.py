@@ -122,9 +122,9 @@ def measure(
         (4, 4) pose whose ground position and heading the camera is given, which no frame shows.
     """
     measured = np.isfinite(frame.depth)
-    points = depth_to_points(frame.depth, settings.camera).astype(np.float64)
+    points = depth_to_points(frame.depth, frame.camera(settings)).astype(np.float64)
     table = _fit_table(points[(frame.labels == TABLE) & measured], settings.faces)
-    camera = replace(settings.camera, pose=pose_above(table, heading))
+    camera = replace(frame.camera(settings), pose=pose_above(table, heading))
     world = points @ camera.pose[:3, :3].T + camera.position
     boxes = []
     for label in frame.objects:

@@ -21,10 +21,10 @@ class CascadeSettings:
     Attributes
     ----------
     margins
-        For each stage, the windows' size over that of the bodies' images: for the first body, and
-        for the others.
+        For each stage, the windows' size over that of the bodies' images: for the body with the
+        largest image, and for the others.
     pixels
-        Approximate number of pixels of a window: for the first body, and for the others.
+        Approximate number of pixels of a window: for that body, and for the others.
     channels
         Output channels of the convolutions.
     hidden

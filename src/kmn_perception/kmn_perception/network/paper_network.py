@@ -46,7 +46,8 @@ class PaperNetwork(MorphNetwork):
             layers += [nn.Conv2d(inputs, outputs, 3, padding=1), nn.MaxPool2d(2), nn.ReLU()]
         self.convolutions = nn.Sequential(*layers)
         shrunk = 2 ** len(channels)
-        features = channels[-1] * (model.input.width // shrunk) * (model.input.height // shrunk)
+        image = model.depth_image
+        features = channels[-1] * (image.width // shrunk) * (image.height // shrunk)
         self.linear = nn.Linear(features, self.encoding.size)
         self._initialise()
         # Twice as fast to train on a CPU.
@@ -62,10 +63,10 @@ class PaperNetwork(MorphNetwork):
     def described(cls, model: KinematicModel, design: Section) -> PaperNetwork:
         """Return the network of a description, which saw depth images as the model sees them."""
         design.allow(("channels", "input"))
-        if design.section("input").values != vars(model.input):
+        if design.section("input").values != vars(model.depth_image):
             raise design.error(
                 f"'input' is {design.values['input']}, that of model '{model.name}' is "
-                f"{vars(model.input)}"
+                f"{vars(model.depth_image)}"
             )
         return cls(model, _channels(design))
 
@@ -98,7 +99,7 @@ class PaperNetwork(MorphNetwork):
             (B, 2, height, width) coverage 0 or 1, and depth about 1/2 times the contrast.
         """
         covered = (depth > 0.0).to(depth.dtype)
-        contrast = self.model.input.contrast
+        contrast = self.model.depth_image.contrast
         return torch.stack((covered, contrast * (depth - 0.5) * covered), dim=1)
 
     def start(self, observations: Sequence[Observation]) -> NDArray[np.float64]:
@@ -158,11 +159,12 @@ class PaperNetwork(MorphNetwork):
 
     def input_types(self, step: int) -> tuple[InputType, ...]:
         """Return that of the depth image."""
-        return (InputType((self.model.input.height, self.model.input.width), np.float32),)
+        image = self.model.depth_image
+        return (InputType((image.height, image.width), np.float32),)
 
     def describe(self) -> dict[str, Any]:
         """Return the channels and the depth image's settings."""
-        return {"channels": list(self.channels), "input": vars(self.model.input).copy()}
+        return {"channels": list(self.channels), "input": vars(self.model.depth_image).copy()}
 
 
 def _channels(design: Section) -> list[int]:

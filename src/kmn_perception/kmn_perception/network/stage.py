@@ -37,10 +37,7 @@ class Stage(nn.Module):
         symmetry: str,
     ) -> None:
         super().__init__()
-        self.windows = [
-            Window.around(model, body, margins[min(body, 1)], settings.pixels[min(body, 1)])
-            for body in range(len(model.bodies))
-        ]
+        self.windows = Window.of_model(model, margins, settings.pixels)
         self.encoding = ParameterEncoding(model, symmetry)
         self.trunks = nn.ModuleList(_trunk(settings.channels) for _ in self.windows)
         features = 0

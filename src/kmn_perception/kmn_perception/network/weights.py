@@ -38,6 +38,12 @@ class Weights:
     metadata: dict[str, Any]
 
 
+def default_file(model: KinematicModel) -> str | Path:
+    """Return the weights of a model where none are told: beside its file, or the shipped ones."""
+    beside = model.file.with_suffix(".safetensors")
+    return beside if beside.is_file() else model.name
+
+
 def save(path: Path, weights: Weights) -> None:
     """Write a weight file; raise ``OSError`` where that fails, with no part of it left."""
     networks = {"network": weights.network, "baseline": weights.baseline}

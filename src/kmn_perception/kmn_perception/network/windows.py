@@ -43,7 +43,9 @@ class Window:
     plane: NDArray[np.float64]
 
     @classmethod
-    def around(cls, model: KinematicModel, body: int, margin: float, area: int) -> Window:
+    def around(
+        cls, model: KinematicModel, body: int, margin: float, area: int, largest: float = np.inf
+    ) -> Window:
         """Return the window around a body of the prototype.
 
         Parameters
@@ -52,23 +54,39 @@ class Window:
             Size of the window over that of the body's image.
         area
             Approximate number of pixels; both sides are multiples of 8.
+        largest
+            The window's sides are no longer than this, in pixels of the canonical image.
 
         Raises
         ------
         ConfigurationError
             If the canonical camera does not see the prototype's body.
         """
-        prototype = model.prototype_cubes
-        v, u = np.nonzero(~np.isnan(render(prototype[body : body + 1], model.camera)))
-        if not len(u):
-            raise ConfigurationError(
-                f"{model.name}: the camera does not see the prototype's {model.bodies[body].name}"
-            )
-        low, high = np.array([u.min(), v.min()]) - 0.5, np.array([u.max(), v.max()]) + 0.5
-        centre, size = (low + high) / 2.0, (high - low) * margin
+        low, high = _extent(model, body)
+        centre, size = (low + high) / 2.0, np.minimum((high - low) * margin, largest)
         pixels = np.maximum(8, np.rint(np.sqrt(area * size / size[::-1]) / 8.0).astype(int) * 8)
         camera = _crop(model.camera, centre - size / 2.0, size, pixels)
-        return cls(body, camera, _plane(render(prototype, camera)))
+        return cls(body, camera, _plane(render(model.prototype_cubes, camera)))
+
+    @classmethod
+    def of_model(
+        cls, model: KinematicModel, margins: tuple[float, float], areas: tuple[int, int]
+    ) -> list[Window]:
+        """Return the window around each body, see `around`.
+
+        Parameters
+        ----------
+        margins, areas
+            For the body with the largest image, and for the others; their windows are not longer
+            than its own.
+        """
+        extents = [np.subtract(*_extent(model, body)[::-1]) for body in range(len(model.bodies))]
+        main = int(np.argmax([extent.prod() for extent in extents]))
+        largest = float(extents[main].max()) * margins[0]
+        return [
+            cls.around(model, body, margins[body != main], areas[body != main], largest)
+            for body in range(len(model.bodies))
+        ]
 
 
 @dataclass(frozen=True)
@@ -134,6 +152,17 @@ def morph_of_body(
     cube = model.unit_cubes(*model.split(values))[body]
     morph: NDArray[np.float64] = model.prototype_cubes[body] @ np.linalg.inv(cube)
     return morph
+
+
+def _extent(model: KinematicModel, body: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and largest u, v (2,) of a body of the prototype in the canonical image."""
+    cube = model.prototype_cubes[body : body + 1]
+    v, u = np.nonzero(~np.isnan(render(cube, model.camera)))
+    if not len(u):
+        raise ConfigurationError(
+            f"{model.name}: the camera does not see the prototype's {model.bodies[body].name}"
+        )
+    return np.array([u.min(), v.min()]) - 0.5, np.array([u.max(), v.max()]) + 0.5
 
 
 def _crop(

@@ -22,6 +22,7 @@ from kmn_perception.training.settings import SharedSettings, TrainingSettings
 from kmn_perception.training.training import Training
 from kmn_perception.training.workers import Workers
 
+DEFAULT = "default"  # settings for any model
 CHANGES = ("network", "samples", "epochs", "retrain_epochs", "rounds", "seed")
 
 
@@ -31,7 +32,9 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     count, positive = whole_number(0), whole_number(1)
     parser.add_argument("--model", required=True, help="name or YAML file of the kinematic model")
     parser.add_argument("--out", required=True, type=output_file, help="weight file to write")
-    parser.add_argument("--config", help="name or YAML file of the settings (default: the model's)")
+    parser.add_argument(
+        "--config", help="name or YAML file of the settings (default: the model's, or `default`)"
+    )
     parser.add_argument("--network", choices=DESIGNS, help="design in place of the settings'")
     parser.add_argument("--samples", type=whole_number(10), help="N_data in place of the settings'")
     parser.add_argument("--epochs", type=positive, help="epochs of the first round")
@@ -51,15 +54,14 @@ def settings_of(options: argparse.Namespace) -> TrainingSettings:
     """Return the settings of the file with those of the command line in their place.
 
     Without ``--config`` they are those shipped for the model and the given design, if there are
-    any, else those of the model.
+    any, else those of the model, else those for any model.
     """
     given = {name: getattr(options, name) for name in CHANGES}
     changes = {name: value for name, value in given.items() if value is not None}
     shipped = resources.share_directory() / "config/training"
-    name = f"{options.network}/{options.model}"
-    if options.config or not (shipped / f"{name}.yaml").is_file():
-        name = options.config or options.model
-    return load_training_settings(name, changes)
+    names = (f"{options.network}/{options.model}", options.model)
+    known = (name for name in names if (shipped / f"{name}.yaml").is_file())
+    return load_training_settings(options.config or next(known, DEFAULT), changes)
 
 
 def train(options: argparse.Namespace) -> None:

@@ -55,7 +55,7 @@ def _draw(
 ) -> None:
     drawn = replace(
         model,
-        input=replace(model.input, width=WIDTH, height=HEIGHT, supersampling=1, max_gap=GAP),
+        input=replace(model.depth_image, width=WIDTH, height=HEIGHT, supersampling=1, max_gap=GAP),
     )
     inverse = model.transformation.inverse(theta)
     depth = point_cloud_to_depth(drawn, observation.points, inverse)

@@ -26,8 +26,15 @@ def simulate() -> Iterator[MakeSimulation]:
             kinematic = KinematicModel.load(model)
             values = np.zeros(len(kinematic.parameters)) if values is None else np.array(values)
             renderer = options.pop("renderer", "egl")
+            drift = options.pop("odometry_drift", 0.0)
             scenario = Scenario(kinematic, values, **options)
-            simulation = Simulation(scenario, WorldSettings.load(), renderer=renderer)
+            simulation = Simulation(
+                scenario,
+                WorldSettings.load(),
+                renderer=renderer,
+                allow_partial=True,
+                odometry_drift=drift,
+            )
             return stack.enter_context(closing(simulation))
 
         yield make

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
-from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.sensors.depth_camera import DepthCamera, mount_error
 from kmn_sim.world.clipping import nearest_depth
 from kmn_sim.world.renderer import RENDERERS
 from kmn_sim.world.scenario import Scenario
@@ -98,3 +99,19 @@ def test_nothing_that_is_seen_lies_before_the_clipping_plane() -> None:
         bound = nearest_depth(camera, np.array([[centre - size / 2.0, centre + size / 2.0]]))
         if np.isfinite(depth).any():
             assert bound <= np.nanmin(depth) + 1e-6
+
+
+def test_a_camera_out_of_calibration_measures_from_elsewhere_than_it_tells(
+    simulation: Simulation,
+) -> None:
+    model = KinematicModel.load("door")
+    simulation.build(Scenario(model, model.prototype, **MODELS["door"]))
+    mounted = mount_error(0.01, np.radians(1.0), 4)
+    assert np.linalg.norm(mounted[:3, 3]) == pytest.approx(0.01)
+    assert np.trace(mounted[:3, :3]) == pytest.approx(1.0 + 2.0 * np.cos(np.radians(1.0)))
+    off = DepthCamera(model.camera, scale=1.01, mounted=mounted)
+    assert off.camera(simulation) is model.camera
+    there = replace(model.camera, pose=model.camera.pose @ mounted)
+    exact = 1.01 * render(simulation.unit_cubes(), there)
+    error = np.abs(off.capture(simulation) - exact)[surface(exact)]
+    assert error.max() <= 1e-3

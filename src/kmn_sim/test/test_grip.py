@@ -20,7 +20,7 @@ TIPS = ("l_gripper_l_finger_tip_joint", "l_gripper_r_finger_tip_joint")
 
 def move_gripper(simulation: Simulation, angle: float) -> None:
     command = Command((RobotSettings.load().gripper.joint,), [Waypoint(0.5, (angle,))])
-    simulation.controller.accept(command, simulation.time)
+    simulation.controllers.accept(command, simulation.time)
 
 
 def grip(simulation: Simulation, friction: float) -> tuple[int, NDArray[np.float64]]:

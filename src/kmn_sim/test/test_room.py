@@ -13,7 +13,6 @@ from kmn_perception.model.rendering import render
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.sensors.depth_camera import DepthCamera
-from kmn_sim.world.door import PANEL_LINK
 from kmn_sim.world.room import Room, Way
 from kmn_sim.world.room_settings import RoomSettings
 from kmn_sim.world.scenario import Scenario, ScenarioError, in_room
@@ -38,11 +37,13 @@ def test_the_panel_swings_free_of_its_frame(simulate: Simulate, direction: str, 
     deepest = getattr(RoomSettings.load().recess, direction)[1]
     for recess in (0.0, deepest):
         simulation = room(simulate, direction, seed, recess)
-        physics, door = simulation.physics, simulation.door
+        physics, door = simulation.physics, simulation.mechanism
         assert door is not None
         for angle in np.linspace(0.0, SWINGS[direction], 40):
-            physics.resetJointState(door.body, PANEL_LINK, angle)
-            for point in physics.getClosestPoints(door.body, door.body, 0.1, PANEL_LINK, AROUND):
+            physics.resetJointState(door.body, door.link("hinge"), angle)
+            for point in physics.getClosestPoints(
+                door.body, door.body, 0.1, door.link("hinge"), AROUND
+            ):
                 assert point[8] > 0.001, angle
 
 
@@ -78,10 +79,10 @@ def test_the_wall_stops_the_robot(simulate: Simulate, direction: str) -> None:
     simulation.build(in_room(simulation.scenario, 0))
     names = RobotSettings.load().base_names
     aside = Command(names, [Waypoint(3.0, (-1.0, -1.2, 0.0)), Waypoint(5.0, (0.5, -1.2, 0.0))])
-    simulation.controller.accept(aside, simulation.time)
+    simulation.controllers.accept(aside, simulation.time)
     simulation.run(5.0)
-    assert simulation.door is not None
-    bodies = simulation.robot.body, simulation.door.body
+    assert simulation.mechanism is not None
+    bodies = simulation.robot.body, simulation.mechanism.body
     touched = simulation.physics.getContactPoints(*bodies)
     assert any(point[4] == AROUND for point in touched)
     assert simulation.robot.base_pose()[0, 3] < -0.2
@@ -94,7 +95,7 @@ def test_furniture_is_never_in_the_way_of_robot_and_door() -> None:
     for seed in range(200):
         values = MODEL.sample(np.random.default_rng(seed), 1)[0]
         for direction in SWINGS:
-            way = Way.of(MODEL, values, (start[0], start[1]))
+            way = Way.of(MODEL, MODEL.actions[0], values, (start[0], start[1]))
             drawn = Room.draw(settings, direction, seed, way)
             if drawn.furniture is None:
                 continue

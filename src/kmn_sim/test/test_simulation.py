@@ -32,7 +32,7 @@ def arm(simulation: Simulation) -> list[float]:
 
 def reach(simulation: Simulation, seconds: float = 3.0) -> None:
     command = Command(ARM, [Waypoint(seconds, REACH, (0.0,) * 7)])
-    simulation.controller.accept(command, simulation.time)
+    simulation.controllers.accept(command, simulation.time)
 
 
 def test_the_arm_follows_a_trajectory_closely(simulate: Simulate) -> None:
@@ -74,7 +74,7 @@ def test_a_blocked_arm_does_not_go_through_what_blocks_it(simulate: Simulate) ->
     wall = physics.createCollisionShape(physics.GEOM_BOX, halfExtents=(0.05, 2.0, 2.0))
     physics.createMultiBody(0.0, wall, basePosition=(-2.3, 0.0, 1.0))
     command = Command(("base_x",), [Waypoint(2.0, (-2.0,))])
-    simulation.controller.accept(command, 0.0)
+    simulation.controllers.accept(command, 0.0)
     simulation.run(3.0)
     assert robot.state().positions[0] < -2.5
 
@@ -83,7 +83,7 @@ def test_fingers_close_together(simulate: Simulate) -> None:
     simulation = simulate()
     for target in (0.5, 0.05):
         command = Command((ROBOT.gripper.joint,), [Waypoint(1.0, (target,))])
-        simulation.controller.accept(command, simulation.time)
+        simulation.controllers.accept(command, simulation.time)
         simulation.run(1.5)
         for name in ROBOT.finger_names:
             link = simulation.robot.link(name)

@@ -19,8 +19,11 @@ HERE = State.at_rest(np.array([0.0, 0.5]))
 NAN, INF = math.nan, math.inf
 
 
-def controller(from_desired_state: bool = True) -> TrajectoryController:
-    return TrajectoryController(LIMITS, HERE.positions, from_desired_state)
+def controller(
+    from_desired_state: bool = True, allow_partial: bool = False
+) -> TrajectoryController:
+    nowhere = np.zeros(2, bool)
+    return TrajectoryController(LIMITS, HERE.positions, nowhere, from_desired_state, allow_partial)
 
 
 def line(*points: tuple[float, float, float], start: float | None = None) -> Command:
@@ -67,32 +70,46 @@ def test_velocities_make_it_cubic() -> None:
     assert it.sample(1.0, HERE).velocities == near(0.75, 0.0)
 
 
-def test_a_start_in_the_future_is_waited_for_while_the_old_one_goes_on() -> None:
+def test_a_start_in_the_future_replaces_the_running_one_at_once() -> None:
+    """It leads from the present state to its first point, which is due at 2 + 3 + 1 s."""
     it = controller()
     it.accept(line((10.0, 1.0, 0.5)), 0.0)
     position(it, 0.0)
-    it.accept(line((1.0, 0.0, 0.5), start=4.0), 2.0)
-    assert position(it, 3.0) == near(0.3, 0.5)
+    it.accept(line((1.0, 0.6, 0.5), (2.0, 0.0, 0.5), start=5.0), 2.0)
+    assert position(it, 2.0) == near(0.2, 0.5)
     assert position(it, 4.0) == near(0.4, 0.5)
-    assert position(it, 4.5) == near(0.2, 0.5)
+    assert position(it, 6.0) == near(0.6, 0.5)
+    assert position(it, 6.5) == near(0.3, 0.5)
     assert position(it, 9.0) == near(0.0, 0.5)
 
 
-def test_a_newer_one_replaces_the_one_that_waits() -> None:
+def test_one_that_has_not_begun_is_replaced_too() -> None:
     it = controller()
     it.accept(line((1.0, 1.0, 0.5), start=5.0), 0.0)
-    it.accept(line((1.0, -1.0, 0.5), start=6.0), 1.0)
-    assert position(it, 5.5) == near(0.0, 0.5)
-    assert position(it, 6.0) == near(0.0, 0.5)
-    assert position(it, 7.0) == near(-1.0, 0.5)
+    it.accept(line((0.0, -1.0, 0.5), start=4.0), 0.0)
+    assert position(it, 0.0) == near(0.0, 0.5)
+    assert position(it, 2.0) == near(-0.5, 0.5)
+    assert position(it, 6.0) == near(-1.0, 0.5)
 
 
-def test_points_in_the_past_are_left_out() -> None:
+def test_with_points_in_the_past_it_is_followed_from_where_it_is() -> None:
     it = controller()
-    it.accept(line((1.0, 1.0, 2.0), (3.0, 0.4, 0.1), start=8.0), 10.0)
-    assert position(it, 10.0) == near(0.0, 0.5)
-    assert position(it, 10.5) == near(0.2, 0.3)
-    assert position(it, 11.0) == near(0.4, 0.1)
+    it.accept(line((1.0, 1.0, 2.0), (3.0, 0.4, 0.0), (4.0, 0.0, 0.0), start=8.0), 10.0)
+    assert position(it, 10.0) == near(0.7, 1.0)
+    assert position(it, 10.5) == near(0.55, 0.5)
+    assert position(it, 11.0) == near(0.4, 0.0)
+
+
+def test_the_rest_of_the_running_one_with_more_points_changes_nothing() -> None:
+    """As long as the new one begins with a point that has passed."""
+    it, undisturbed = controller(), controller()
+    points = [(t, 0.1 * t**2 - 1.0, 1.0 - 0.2 * t) for t in (1.0, 1.5, 2.0, 3.0, 4.0)]
+    undisturbed.accept(line(*points, start=10.0), 9.0)
+    it.accept(line(*points[:3], start=10.0), 9.0)
+    for now in np.arange(9.0, 15.0, 0.1).tolist():
+        if 11.6 < now < 11.75:
+            it.accept(line(*points[1:], start=10.0), now)
+        assert position(it, now) == near(*position(undisturbed, now))
 
 
 @pytest.mark.parametrize("from_desired_state", [True, False])
@@ -108,21 +125,27 @@ def test_replacement_goes_on_from_the_present_state(from_desired_state: bool) ->
     assert position(it, 6.0, behind) == near((start - 0.5) / 2.0, 0.5)
 
 
-def test_an_empty_trajectory_holds() -> None:
-    it = controller()
+@pytest.mark.parametrize("from_desired_state", [True, False])
+def test_one_point_at_once_is_a_hold(from_desired_state: bool) -> None:
+    it = controller(from_desired_state)
     it.accept(line((10.0, 1.0, 0.5)), 0.0)
     position(it, 0.0)
     assert position(it, 5.0) == near(0.5, 0.5)
-    it.accept(line((1.0, 1.0, 0.5), start=8.0), 5.0)
-    it.accept(Command((), ()), 5.0)
-    for now in (5.1, 8.5, 10.0):
-        assert position(it, now) == near(0.5, 0.5)
-    assert it.sample(10.0, HERE).velocities == near(0.0, 0.0)
+    it.accept(line((0.0, 0.45, 0.5)), 5.0)
+    for now in (5.0, 5.1, 10.0):
+        assert position(it, now) == near(0.45, 0.5)
+        assert it.sample(now, HERE).velocities == near(0.0, 0.0)
+
+
+def test_a_hold_a_little_beyond_a_limit_is_a_hold_at_the_limit() -> None:
+    it = controller()
+    it.accept(line((0.0, 1.01, 0.5)), 0.0)
+    assert position(it, 0.0) == near(1.0, 0.5)
 
 
 @pytest.mark.parametrize("velocities", [(), (0.0,)])
 def test_joints_that_are_not_named_hold(velocities: tuple[float, ...]) -> None:
-    it = controller()
+    it = controller(allow_partial=True)
     it.accept(Command(("b",), [Waypoint(2.0, (-1.5,), velocities)]), 0.0)
     position(it, 0.0)
     assert position(it, 1.0) == near(0.0, -0.5)
@@ -136,6 +159,17 @@ def test_joints_come_in_any_order() -> None:
     assert position(it, 1.0) == near(0.7, -1.0)
 
 
+def test_a_joint_that_turns_on_and_on_goes_the_shorter_way() -> None:
+    """From 0 to a position that is a turn and a bit away, of the first joint but not the second."""
+    limits = dict.fromkeys(NAMES, (-99.0, 99.0))
+    it = TrajectoryController(limits, np.zeros(2), np.array([True, False]), True, False)
+    there = 2.0 * np.pi + 0.2
+    it.accept(line((2.0, there, there)), 0.0)
+    assert position(it, 0.0) == near(2.0 * np.pi, 0.0)
+    assert position(it, 1.0) == near(2.0 * np.pi + 0.1, there / 2.0)
+    assert position(it, 2.0) == near(there, there)
+
+
 def test_progress_goes_from_0_to_1() -> None:
     it = controller()
     assert it.progress(0.0) is None
@@ -147,7 +181,10 @@ def test_progress_goes_from_0_to_1() -> None:
 REFUSED = {
     "unknown_joint": Command(("a", "c"), [Waypoint(1.0, (0.0, 0.0))]),
     "joint_names": Command(("a", "a"), [Waypoint(1.0, (0.0, 0.0))]),
-    "joint_names of none": Command((), [Waypoint(1.0, ())]),
+    "empty": Command((), ()),
+    "empty of joints": Command((), [Waypoint(1.0, ())]),
+    "empty of points": Command(NAMES, ()),
+    "partial": Command(("b",), [Waypoint(1.0, (0.0,))]),
     "lengths": Command(NAMES, [Waypoint(1.0, (0.0,))]),
     "lengths of none": Command(NAMES, [Waypoint(1.0, ())]),
     "lengths of velocities": Command(NAMES, [Waypoint(1.0, (0.0, 0.0), (0.0,))]),
@@ -158,7 +195,7 @@ REFUSED = {
     "not_finite": line((1.0, NAN, 0.0)),
     "not_finite, infinite": line((1.0, 0.0, INF)),
     "not_finite velocity": Command(NAMES, [Waypoint(1.0, (0.0, 0.0), (0.0, NAN))]),
-    "out_of_limits": line((1.0, 0.0, 0.0), (2.0, 1.01, 0.0)),
+    "out_of_limits": line((1.0, 0.0, 0.0), (2.0, 1.03, 0.0)),
     "effort": Command(NAMES, [Waypoint(1.0, (0.0, 0.0), (), (), (1.0, 1.0))]),
     "moving_end": Command(NAMES, [Waypoint(1.0, (0.0, 0.0), (0.1, 0.0))]),
     "in_the_past": line((1.0, 0.0, 0.0), (2.0, 0.0, 0.0), start=97.9),

@@ -58,10 +58,10 @@ def touch(simulation: Simulation, points: Sequence[TouchPoint]) -> None:
     for point in points:
         position |= point.joints
         waypoints.append(Waypoint(point.time, tuple(position.values())))
-    simulation.controller.accept(Command(names, waypoints), simulation.time)
+    simulation.controllers.accept(Command(names, waypoints), simulation.time)
     simulation.run(points[-1].time)
-    assert simulation.door is not None
-    bodies = simulation.robot.body, simulation.door.body
+    assert simulation.mechanism is not None
+    bodies = simulation.robot.body, simulation.mechanism.body
     if not simulation.physics.getContactPoints(*bodies):
         raise ProcessError("the robot does not touch the door")
 

@@ -18,7 +18,12 @@ from rclpy.node import Node
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
+from kmn_perception.ros.node_process import (
+    NodeProcess,
+    ProcessClient,
+    namespace_arguments,
+    parameter_arguments,
+)
 from kmn_perception.ros.stamps import seconds
 from kmn_sim.checks.settings import PerceptionCheckSettings
 
@@ -131,7 +136,7 @@ def scene_client(
     settings
         Of the camera's rate, and how long to wait.
     """
-    alone = f"__ns:=/sim_{os.getpid()}"  # whatever else runs here is not disturbed
+    alone = namespace_arguments(f"/sim_{os.getpid()}")  # whatever else runs is not disturbed
     sim: dict[str, Any] = {
         "model": name,
         "placement": "given",
@@ -146,7 +151,7 @@ def scene_client(
                 NodeProcess(
                     package,
                     executable,
-                    [*parameter_arguments(parameters), "-r", alone],
+                    [*parameter_arguments(parameters), *alone],
                     folder / executable,
                 )
             )
@@ -155,6 +160,6 @@ def scene_client(
                 ("kmn_perception", "morph_node", morph),
             )
         ]
-        node = rclpy.create_node("scenes", cli_args=["--ros-args", "-r", alone])
+        node = rclpy.create_node("scenes", cli_args=["--ros-args", *alone])
         stack.callback(node.destroy_node)
         yield SceneClient(node, processes, settings)

@@ -28,6 +28,28 @@ class State(NamedTuple):
         """Return the state of joints that stand still."""
         return cls(positions.copy(), np.zeros_like(positions), np.zeros_like(positions))
 
+    def of(self, columns: list[int]) -> State:
+        """Return the state of some of the joints."""
+        return State(*(values[columns] for values in self))
+
+
+def nearest(
+    positions: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    continuous: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Return positions (J,) turned by whole turns to be nearest to others, where that is the same.
+
+    Parameters
+    ----------
+    reference
+        (J,) or (1,) radians.
+    continuous
+        (J,) whether a whole turn of a joint changes nothing.
+    """
+    turns = 2.0 * np.pi * np.round((reference - positions) / (2.0 * np.pi))
+    return np.where(continuous, positions + turns, positions)
+
 
 def interpolate(start: State, end: State, duration: float, time: float) -> State:
     """Return the state between two states.

@@ -1,17 +1,19 @@
 """Joint trajectories: what a command must fulfil to be executed, and its sampling.
 
-The semantics are those that ros2_control documents for its joint_trajectory_controller.
+The semantics are those of joint_trajectory_controller on branch jazzy of ros2_controllers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_sim.control.interpolation import State, interpolate
+from kmn_sim.control.interpolation import State, interpolate, nearest
+
+LIMIT_SLACK = 0.02  # m and rad; a joint that is to hold may have been measured beyond its limit
 
 
 class TrajectoryError(ValueError):
@@ -46,11 +48,11 @@ class Command:
     Attributes
     ----------
     names
-        Joints that the points are of; other joints hold their position.
+        Joints that the points are of.
     points
-        Without any, all joints hold where they are.
+        Through which the joints are to go.
     start
-        Time at which it starts, seconds; None: at once.
+        From which the times of the points count, seconds; None: from now.
     """
 
     names: Sequence[str]
@@ -76,22 +78,33 @@ class Trajectory:
     times: NDArray[np.float64]
     states: tuple[State, ...]
 
-    def follow_from(self, present: State, now: float) -> Trajectory:
-        """Return the trajectory from the present state through the waypoints still ahead.
+    def of(self, columns: list[int]) -> Trajectory:
+        """Return the trajectory of some of the joints."""
+        return replace(self, states=tuple(state.of(columns) for state in self.states))
 
-        Joints that are not commanded hold their present position. A waypoint that is due now is
-        reached without interpolation.
+    def begin(
+        self, present: State, commanded: State, continuous: NDArray[np.bool_], now: float
+    ) -> Trajectory:
+        """Return the trajectory as it is followed from now on.
+
+        Up to a first point that is still ahead it leads there from the present state, at once,
+        whatever its start is. With points in the past it is followed from where it is now: what
+        the robot does then does not matter, and its desired state jumps.
+
+        Parameters
+        ----------
+        present
+            State from which the first point is reached.
+        commanded
+            Where joints hold that the command does not name.
+        continuous
+            (J,) whether a whole turn of a joint changes nothing; it goes the shorter way.
         """
-        ahead = [
-            (time, _filled(state, present))
-            for time, state in zip(self.times, self.states, strict=True)
-            if time >= now
-        ]
-        ahead = ahead or [(now, _filled(self.states[-1], present))]
-        if ahead[0][0] > now:
-            ahead.insert(0, (now, present))
-        times, states = zip(*ahead, strict=True)
-        return Trajectory(now, np.array(times), states)
+        times, states = self.times, tuple(_filled(state, commanded) for state in self.states)
+        if times[0] > now:
+            turned = nearest(present.positions, states[0].positions, continuous)
+            times, states = np.insert(times, 0, now), (present._replace(positions=turned), *states)
+        return Trajectory(now, times, states)
 
     def sample(self, now: float) -> State:
         """Return the state that is desired at a time; after the end the last one, at rest."""
@@ -109,8 +122,17 @@ class Trajectory:
         return 1.0 if now >= self.times[-1] else float(max(now - self.start, 0.0) / duration)
 
 
-def check(command: Command, limits: Mapping[str, tuple[float, float]], now: float) -> Trajectory:
-    """Return the trajectory of a command with at least one point.
+def check(
+    command: Command,
+    limits: Mapping[str, tuple[float, float]],
+    now: float,
+    allow_partial: bool,
+) -> Trajectory:
+    """Return the trajectory of a command.
+
+    What the stock controller refuses is refused, and in addition joints that are named twice,
+    times before the start, numbers that are not finite, and positions well beyond the limits, which
+    it would pass on to the hardware.
 
     Parameters
     ----------
@@ -118,13 +140,17 @@ def check(command: Command, limits: Mapping[str, tuple[float, float]], now: floa
         Lower and upper position of each joint by name, in the order of the states.
     now
         Present time, seconds.
+    allow_partial
+        Whether a command need not name all joints.
 
     Raises
     ------
     TrajectoryError
         If anything is wrong with it.
     """
-    _check_names(command.names, limits)
+    _check_names(command.names, limits, allow_partial)
+    if not command.points:
+        raise TrajectoryError("empty", "the trajectory has no points, expected at least one")
     times = [point.time for point in command.points]
     _check_times(times)
     for number, point in enumerate(command.points):
@@ -153,13 +179,13 @@ def check(command: Command, limits: Mapping[str, tuple[float, float]], now: floa
     return Trajectory(start, start + np.array(times), states)
 
 
-def _filled(state: State, present: State) -> State:
-    """Let the joints that are not commanded hold their present position."""
+def _filled(state: State, commanded: State) -> State:
+    """Let the joints that are not named hold their commanded position."""
     absent = np.isnan(state.positions)
     moving = [
         np.where(absent & ~np.isnan(values[~absent]).any(), 0.0, values) for values in state[1:]
     ]
-    return State(np.where(absent, present.positions, state.positions), *moving)
+    return State(np.where(absent, commanded.positions, state.positions), *moving)
 
 
 def _spread(values: Sequence[float], columns: list[int], joints: int) -> NDArray[np.float64]:
@@ -170,14 +196,25 @@ def _spread(values: Sequence[float], columns: list[int], joints: int) -> NDArray
     return spread
 
 
-def _check_names(names: Sequence[str], limits: Mapping[str, tuple[float, float]]) -> None:
+def _check_names(
+    names: Sequence[str], limits: Mapping[str, tuple[float, float]], allow_partial: bool
+) -> None:
+    if not names:
+        raise TrajectoryError("empty", "the trajectory names no joints")
     for name in names:
         if name not in limits:
             raise TrajectoryError(
                 "unknown_joint", f"unknown joint '{name}', there are {', '.join(limits)}"
             )
-    if not names or len(set(names)) != len(names):
-        raise TrajectoryError("joint_names", f"joint names must be there and differ: {list(names)}")
+    if len(set(names)) != len(names):
+        raise TrajectoryError("joint_names", f"joint names must differ: {list(names)}")
+    missing = [name for name in limits if name not in names]
+    if missing and not allow_partial:
+        raise TrajectoryError(
+            "partial",
+            f"joints are missing, {', '.join(missing)}: all must be there unless "
+            "allow_partial_joints_goal is set",
+        )
 
 
 def _check_times(times: Sequence[float]) -> None:
@@ -213,7 +250,7 @@ def _check_point(
         raise TrajectoryError("effort", f"point {number} has efforts, which are not supported")
     for name, position in zip(names, point.positions, strict=True):
         low, high = limits[name]
-        if not low <= position <= high:
+        if not low - LIMIT_SLACK <= position <= high + LIMIT_SLACK:
             raise TrajectoryError(
                 "out_of_limits",
                 f"point {number} has {name} = {position:g}, outside [{low:g}, {high:g}]",

@@ -1,23 +1,25 @@
-"""Print the URDF of the simulated PR2, for robot_state_publisher and RViz."""
+"""Print the URDF of a simulated robot, for RViz and MoveIt."""
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from kmn_perception.configuration.section import ConfigurationError
-from kmn_sim.robot.pr2_model import RobotModelError, pr2_urdf
+from kmn_sim.robot.description import RobotDescription
+from kmn_sim.robot.robot_model import robot_urdf
 from kmn_sim.robot.settings import RobotSettings
 
 
 def main() -> int:
     """Run the executable ``robot_description``."""
+    parser = argparse.ArgumentParser(prog="robot_description", description=__doc__)
+    parser.add_argument("--robot", default="", help="name in config/robots, or file; as sim_node's")
     try:
-        file = pr2_urdf(RobotSettings.load())
-    except (RobotModelError, ConfigurationError) as error:
+        settings = RobotSettings.load(parser.parse_args().robot)
+        description = RobotDescription(robot_urdf(settings), settings)
+    except (OSError, ConfigurationError) as error:
         print(f"robot_description: {error}", file=sys.stderr)
         return 1
-    # Its meshes lie beside it, which only those can know who read it from there.
-    print(
-        file.read_text(encoding="utf-8").replace('filename="', f'filename="file://{file.parent}/')
-    )
+    print(description.text)
     return 0

@@ -1,21 +1,31 @@
-"""The robot of the simulator: what its model lacks, from ``config/robots/pr2.yaml``."""
+"""The robot of the simulator: what its model lacks, from ``config/robots/NAME.yaml``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.node_parameters import load_node_parameters
+from kmn_perception.configuration.robot_parts import (
+    BaseSettings,
+    ControllerSettings,
+    Gripper,
+    controllers_fault,
+    joints_in_messages,
+)
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.configuration.settings import (
     Fraction,
-    Interval,
     NonNegative,
     Positive,
     load_settings,
 )
+from kmn_sim.control.gripper_goal import GripperTolerances
+from kmn_sim.control.velocity_controller import VelocityLimits
 
 Colour = tuple[Fraction, Fraction, Fraction, Fraction]
 BASE_SIZE = 3  # the first joints: x, y and yaw of the base
@@ -40,23 +50,9 @@ class Motor(NamedTuple):
     planned: tuple[Positive, Positive]
 
 
-class Gripper(NamedTuple):
-    """The gripper's commanded joint and those that turn with it."""
+class LinkSettings(NamedTuple):
+    """Mass (kg) and inertia (kg m^2) of a link that has no shape."""
 
-    joint: str
-    followers: tuple[str, ...]
-
-
-class BaseSettings(NamedTuple):
-    """The joints of the base: limits by name (m, rad), and the links between them.
-
-    Attributes
-    ----------
-    mass, inertia
-        Of each of these links, kg and kg m^2.
-    """
-
-    limits: dict[str, Interval]
     mass: Positive
     inertia: Positive
 
@@ -80,14 +76,25 @@ class RobotPhysics(NamedTuple):
         Largest torque that couples the gripper's joints, N m.
     friction, spinning_friction
         Contact of the fingers.
+    gripper_action
+        When a gripper that takes commands is where it should be, or stalled.
+    velocity_control
+        Of a base that takes velocities.
+    base
+        The links between the base's joints.
+    masses
+        Of what a joint carries, kg, where the model has none.
     """
 
     position_gain: Fraction
     follower_effort: NonNegative
     friction: NonNegative
     spinning_friction: NonNegative
-    base: BaseSettings
+    gripper_action: GripperTolerances
+    velocity_control: VelocityLimits
+    base: LinkSettings
     colours: Colours
+    masses: dict[str, Positive] = {}
 
 
 @dataclass(frozen=True)
@@ -98,10 +105,16 @@ class RobotSettings:
     ----------
     name, source
         Of the model, and its file in the folder of robotic's models.
-    base
-        The model's one joint of the base.
+    notice
+        Where the model comes from, and its licence.
+    camera
+        The one that it carries, of ``config/cameras``.
     joints
         Movable joints by name, in the order of ``joint_states``: base x, y and yaw first.
+    continuous
+        Names of those of which a whole turn changes nothing.
+    controllers
+        By name; each joint has one.
     simulation
         What only the simulator reads.
     planning
@@ -110,8 +123,12 @@ class RobotSettings:
 
     name: str
     source: str
-    base: str
+    notice: str
+    camera: str
+    base: BaseSettings
     joints: Annotated[dict[str, Motor], Field(min_length=BASE_SIZE)]
+    continuous: tuple[str, ...]
+    controllers: dict[str, ControllerSettings]
     gripper: Gripper
     simulation: RobotPhysics
     planning: Any
@@ -125,6 +142,11 @@ class RobotSettings:
     def base_names(self) -> tuple[str, ...]:
         """Names of the joints of the base: x, y and yaw."""
         return self.names[:BASE_SIZE]
+
+    @property
+    def told_names(self) -> tuple[str, ...]:
+        """Names of the joints that trajectories and ``joint_states`` are of."""
+        return joints_in_messages(self.joints, self.controllers)
 
     @property
     def arm_names(self) -> tuple[str, ...]:
@@ -142,20 +164,39 @@ class RobotSettings:
         home = {name: motor.home for name, motor in self.joints.items()}
         return home | dict.fromkeys(self.gripper.followers, home[self.gripper.joint])
 
+    def error(self, text: str) -> ConfigurationError:
+        """Return the error that says what is wrong with this robot's file."""
+        return ConfigurationError(f"robot '{self.name}': {text}")
+
     @classmethod
-    def load(cls) -> RobotSettings:
-        """Read ``config/robots/pr2.yaml``; raise ``ConfigurationError`` if it is wrong."""
-        file = resources.find("config/robots", "pr2")
+    def load(cls, name_or_path: str | Path = "") -> RobotSettings:
+        """Read ``config/robots/NAME.yaml`` or the user's own file; sim_node's where none is told.
+
+        Raises
+        ------
+        FileNotFoundError, ConfigurationError
+            If there is no such file, or it is wrong.
+        """
+        default = load_node_parameters("sim_node")["robot"].default
+        file = resources.find("config/robots", name_or_path or default)
         settings = load_settings(cls, file)
         if settings.gripper.joint not in settings.joints:
             raise ConfigurationError(
                 f"{file.name}: gripper: 'joint' must be one of {', '.join(settings.joints)}, "
                 f"found {settings.gripper.joint!r}"
             )
-        if tuple(settings.simulation.base.limits) != settings.base_names:
+        fault = controllers_fault(
+            settings.controllers,
+            settings.joints,
+            settings.base_names,
+            settings.gripper.joint,
+            settings.base.kind == "fixed",
+        )
+        if fault:
+            raise ConfigurationError(f"{file.name}: {fault}")
+        if tuple(settings.base.limits) != settings.base_names:
             raise ConfigurationError(
-                f"{file.name}: simulation: base: 'limits' must be of the first joints, "
-                f"{', '.join(settings.base_names)}, found "
-                f"{', '.join(settings.simulation.base.limits)}"
+                f"{file.name}: base: 'limits' must be of the first joints, "
+                f"{', '.join(settings.base_names)}, found {', '.join(settings.base.limits)}"
             )
         return settings

@@ -1,4 +1,4 @@
-"""The PR2 in the physics: its motors follow desired states with bounded effort."""
+"""The robot in the physics: its motors follow desired states with bounded effort."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.transformation import rotation_z
-from kmn_sim.control.interpolation import State
-from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.control.interpolation import State, nearest
+from kmn_sim.robot.odometry import Odometry
+from kmn_sim.robot.settings import BASE_SIZE, RobotSettings
 
+PLACE = slice(0, 2)  # of the base, among the joints
 UNLIMITED = 1e6  # radians; of joints that turn on and on
 GEAR_CORRECTION = 0.2  # part of the error between two geared joints that a step takes away
 
@@ -32,6 +34,8 @@ class SimulatedRobot:
         Height of the floor, metres.
     step_time
         Of the physics, seconds.
+    drift
+        Metres by which odometry errs for each metre driven.
 
     Attributes
     ----------
@@ -39,6 +43,10 @@ class SimulatedRobot:
         Number of the body in the physics.
     limits
         Lower and upper position of the movable joints by name, m and rad.
+    continuous
+        (J,) whether a whole turn of a joint changes nothing.
+    told
+        (J,) whether a joint is one that messages tell of.
     """
 
     def __init__(
@@ -49,6 +57,7 @@ class SimulatedRobot:
         start: Mapping[str, float],
         floor: float,
         step_time: float,
+        drift: float,
     ) -> None:
         self._physics, self._settings, self._floor = physics, settings, floor
         self.body: int = physics.loadURDF(
@@ -64,11 +73,15 @@ class SimulatedRobot:
         self._moved = [self._joints[name][0] for name in settings.names]
         self._all = [joint[0] for joint in self._joints.values() if joint[3] >= 0]
         self.limits = {name: _limits(self._joints[name]) for name in settings.names}
-        self._efforts = [motor.effort for motor in settings.joints.values()]
+        self.continuous = np.isin(settings.names, settings.continuous)
+        self.told = np.isin(settings.names, settings.told_names)
+        self._efforts = {name: motor.effort for name, motor in settings.joints.items()}
         self._speeds = np.array([motor.velocity for motor in settings.joints.values()])
         self._gain = settings.simulation.position_gain / step_time
         for name, position in {**settings.home, **start}.items():
             physics.resetJointState(self.body, self.link(name), position)
+        x, y, _ = self._base()
+        self._odometry = Odometry(np.array([x, y]), drift)
         self._set_contacts()
         self._couple_fingers()
 
@@ -77,36 +90,53 @@ class SimulatedRobot:
         return int(self._joints[joint][0])
 
     def state(self) -> State:
-        """Return the measured state of the movable joints."""
+        """Return the measured state of the movable joints; of the base by odometry."""
         states = self._physics.getJointStates(self.body, self._moved)
         positions, velocities = (np.array([state[i] for state in states]) for i in (0, 1))
+        positions[PLACE] = self._odometry.place(positions[PLACE])
         return State(positions, velocities, np.zeros_like(positions))
 
     def base_pose(self) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the base on the floor, in the world."""
-        joints = [self.link(name) for name in self._settings.base_names]
-        x, y, yaw = (state[0] for state in self._physics.getJointStates(self.body, joints))
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = rotation_z(yaw), (x, y, self._floor)
-        return pose
+        x, y, yaw = self._base()
+        return _pose(x, y, self._floor, yaw)
+
+    def odometry_pose(self) -> NDArray[np.float64]:
+        """Return the pose (4, 4) of the base by odometry, whose frame lies on the floor."""
+        x, y, yaw = self.state().positions[:BASE_SIZE]
+        return _pose(x, y, 0.0, yaw)
 
     def efforts(self) -> NDArray[np.float64]:
         """Return the efforts (J,) of the motors in the last step, N and N m."""
         states = self._physics.getJointStates(self.body, self._moved)
         return np.array([state[3] for state in states])
 
+    def limit_effort(self, joint: str, effort: float) -> None:
+        """Let a motor have this effort at most, N or N m, as far as it has it; 0: its own."""
+        own = self._settings.joints[joint].effort
+        self._efforts[joint] = min(effort, own) if effort > 0.0 else own
+
+    def error(self, desired: State, measured: State) -> NDArray[np.float64]:
+        """Return by how much the joints (J,) are not where they should be; without whole turns."""
+        return nearest(desired.positions - measured.positions, np.zeros(1), self.continuous)
+
     def update(self, desired: State, measured: State) -> None:
         """Let the motors drive from the measured to a desired state in the physics' next step."""
-        error = desired.positions - measured.positions
+        error = self.error(desired, measured)
         velocities = desired.velocities + self._gain * error
         self._physics.setJointMotorControlArray(
             self.body,
             self._moved,
             self._physics.VELOCITY_CONTROL,
             targetVelocities=np.clip(velocities, -self._speeds, self._speeds).tolist(),
-            forces=self._efforts,
+            forces=list(self._efforts.values()),
         )
         self._compensate_gravity()
+
+    def _base(self) -> list[float]:
+        """Return where the base is: x and y, metres, and yaw, radians."""
+        joints = [self.link(name) for name in self._settings.base_names]
+        return [state[0] for state in self._physics.getJointStates(self.body, joints)]
 
     def _info(self, joint: int) -> Any:
         return self._physics.getJointInfo(self.body, joint)
@@ -151,7 +181,7 @@ class SimulatedRobot:
             )
 
     def _compensate_gravity(self) -> None:
-        """Add the efforts that hold the robot's weight, as the PR2's springs and controllers do."""
+        """Add the efforts that hold the robot's weight, as springs and controllers do."""
         states = self._physics.getJointStates(self.body, self._all)
         zeros = [0.0] * len(states)
         efforts = self._physics.calculateInverseDynamics(
@@ -160,6 +190,12 @@ class SimulatedRobot:
         self._physics.setJointMotorControlArray(
             self.body, self._all, self._physics.TORQUE_CONTROL, forces=efforts
         )
+
+
+def _pose(x: float, y: float, z: float, yaw: float) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation_z(np.asarray(yaw)), (x, y, z)
+    return pose
 
 
 def _limits(info: Any) -> tuple[float, float]:

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 import cv2
 import numpy as np
+from control_msgs.action import FollowJointTrajectory
+from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
@@ -14,9 +17,15 @@ from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.stamps import seconds
+from kmn_sim.control.interpolation import State
 from kmn_sim.control.trajectory import Command, Waypoint
+from kmn_sim.control.trajectory_goal import Tolerances
+from kmn_sim.robot.description import BASE_FOOTPRINT
+from kmn_sim.robot.simulated_robot import SimulatedRobot
 from kmn_sim.world.scenario import Scenario
+from kmn_sim.world.simulation import Simulation
 
+ERASED = -1.0  # a tolerance that the controller shall not have
 ENCODINGS = ("rgb8", "mono8")  # of images
 
 
@@ -44,6 +53,37 @@ def command_from_message(
     )
 
 
+def tolerances_from_goal(goal: FollowJointTrajectory.Goal, names: Sequence[str]) -> Tolerances:
+    """Read the tolerances of a goal for the positions of joints; by default there are none.
+
+    As the stock controller reads them: 0 is the default, -1 none; with another negative one or a
+    joint that the controller has not, all are the default.
+    """
+    path, at_end = np.zeros(len(names)), np.zeros(len(names))
+    none = Tolerances(np.zeros(len(names)), np.zeros(len(names)), 0.0)
+    for found, told in ((path, goal.path_tolerance), (at_end, goal.goal_tolerance)):
+        for tolerance in told:
+            if tolerance.name not in names or not (
+                tolerance.position >= 0.0 or tolerance.position == ERASED
+            ):
+                return none
+            found[names.index(tolerance.name)] = max(tolerance.position, 0.0)
+    return Tolerances(path, at_end, max(seconds(goal.goal_time_tolerance), 0.0))
+
+
+def trajectory_feedback(simulation: Simulation, name: str) -> FollowJointTrajectory.Feedback:
+    """Make the feedback of a controller: where its joints are, and where they should be."""
+    controller = simulation.controllers[name]
+    measured = simulation.controllers.part(name, simulation.robot.state())
+    feedback = FollowJointTrajectory.Feedback(joint_names=list(controller.limits))
+    feedback.desired.positions = controller.desired.positions.tolist()
+    feedback.desired.velocities = controller.desired.velocities.tolist()
+    feedback.actual.positions = measured.positions.tolist()
+    feedback.actual.velocities = measured.velocities.tolist()
+    feedback.error.positions = controller.error(measured).tolist()
+    return feedback
+
+
 def joint_state(
     names: Sequence[str],
     positions: Iterable[float],
@@ -59,6 +99,34 @@ def joint_state(
         velocity=[float(value) for value in velocities],
         effort=[float(value) for value in efforts],
     )
+
+
+def robot_state(robot: SimulatedRobot, state: State, header: Header) -> JointState:
+    """Make the message of the robot's joints, without those of a base that odometry alone tells."""
+    told = robot.told
+    names = [name for name, tells in zip(robot.limits, told, strict=True) if tells]
+    efforts = robot.efforts()[told]
+    return joint_state(names, state.positions[told], state.velocities[told], efforts, header)
+
+
+def force_on(force: NDArray[np.float64], header: Header) -> WrenchStamped:
+    """Make the message of a force (3,), N, of whose torque nothing is known."""
+    x, y, z = force.tolist()
+    return WrenchStamped(header=header, wrench=Wrench(force=Vector3(x=x, y=y, z=z)))
+
+
+def odometry(robot: SimulatedRobot, header: Header) -> Odometry:
+    """Make the message of where the base is by odometry; its velocities are in its own frame."""
+    pose, state = robot.odometry_pose(), robot.state()
+    message = Odometry(header=header, child_frame_id=BASE_FOOTPRINT)
+    message.pose.pose.position.x, message.pose.pose.position.y = pose[:2, 3].tolist()
+    yaw = float(np.arctan2(pose[1, 0], pose[0, 0]))
+    message.pose.pose.orientation.z = float(np.sin(yaw / 2.0))
+    message.pose.pose.orientation.w = float(np.cos(yaw / 2.0))
+    forward, left = pose[:2, :2].T @ state.velocities[:2]
+    message.twist.twist.linear.x, message.twist.twist.linear.y = float(forward), float(left)
+    message.twist.twist.angular.z = float(state.velocities[2])
+    return message
 
 
 def ground_truth(

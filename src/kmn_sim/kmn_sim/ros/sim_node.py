@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import time
 import traceback
 from collections.abc import Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.depth_sensor import DepthSensor
@@ -24,14 +23,19 @@ from kmn_perception.model.noisy_sensor import SENSORS, NoisySensor
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.ros.messages import cloud_from_points, image_from_depth, info_from_camera
 from kmn_perception.ros.node_program import run_node
+from kmn_perception.ros.overridable_node import OverridableNode
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ThrottledWarnings, report_periodically
-from kmn_perception.ros.stamps import stamp_of
-from kmn_sim.control.trajectory import TrajectoryError
+from kmn_perception.ros.stamps import seconds, stamp_of
+from kmn_sim.robot.description import RobotDescription
+from kmn_sim.robot.robot_model import robot_urdf
 from kmn_sim.ros import messages
-from kmn_sim.ros.sim_node_parameters import RECORDING, SENSOR, WORLD, SimNodeSettings
+from kmn_sim.ros.controller_servers import ControllerServers
+from kmn_sim.ros.sim_node_parameters import ODOM, RECORDING, SENSOR, WORLD, SimNodeSettings
 from kmn_sim.ros.simulation_statistics import SimulationStatistics
-from kmn_sim.sensors.depth_camera import DepthCamera
+from kmn_sim.ros.trajectory_input import TrajectoryInput
+from kmn_sim.ros.transforms import TransformPublisher
+from kmn_sim.sensors.depth_camera import DepthCamera, mount_error
 from kmn_sim.sensors.recording import RecordingError
 from kmn_sim.sensors.recordings import Recordings
 from kmn_sim.sensors.settings import RecordingSettings
@@ -43,7 +47,7 @@ CLOCK_PERIOD = 0.01  # simulated seconds between two messages on /clock
 QUEUE_DEPTH = 10
 
 
-class SimNode(Node):
+class SimNode(OverridableNode):
     """Runs the simulation in a thread of its own; the executor only takes messages.
 
     Raises
@@ -57,7 +61,7 @@ class SimNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
         self._settings = settings = SimNodeSettings.check(declare_parameters(self, "sim_node"))
-        self._world = WorldSettings.load()
+        self._world = WorldSettings.load(settings["robot"])
         self._depth_camera = self._make_camera(settings)
         self._statistics = SimulationStatistics(self._world.robot.names)
         self._warnings = ThrottledWarnings(self)
@@ -85,9 +89,10 @@ class SimNode(Node):
             self.get_logger().warning(
                 f"renderer '{settings['renderer']}' does not start; rendering by '{renderer}'"
             )
-        self.create_subscription(
-            JointTrajectory, "joint_trajectory", self._on_trajectory, QUEUE_DEPTH
+        trajectories = TrajectoryInput(
+            self._runner, self._statistics, self._warnings, self._to_simulated
         )
+        self._servers = ControllerServers(self, trajectories, self._world.robot.controllers)
         self.create_service(Trigger, "reset", self._on_reset)
         self.add_on_set_parameters_callback(self._on_parameters)
         report_periodically(self, self._report)
@@ -97,6 +102,7 @@ class SimNode(Node):
         """End the simulation's thread and the node."""
         self._runner.close()
         self._recordings.close()
+        self._servers.destroy()
         super().destroy_node()
 
     def _connect(self) -> None:
@@ -104,12 +110,16 @@ class SimNode(Node):
         if self._settings["publish_clock"]:  # /clock is one for all nodes
             self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
         self._joint_publisher = self.create_publisher(JointState, "joint_states", QUEUE_DEPTH)
+        self._odometry_publisher = self.create_publisher(Odometry, "odom", QUEUE_DEPTH)
         self._door_publisher = self.create_publisher(JointState, "door_state", QUEUE_DEPTH)
+        self._force_publisher = self.create_publisher(WrenchStamped, "handle_force", QUEUE_DEPTH)
         self._truth_publisher = self.create_publisher(MorphingParameters, "ground_truth", latched)
         self._image_publisher = self.create_publisher(Image, "depth/image", QUEUE_DEPTH)
         self._info_publisher = self.create_publisher(CameraInfo, "depth/camera_info", QUEUE_DEPTH)
         self._points_publisher = self.create_publisher(PointCloud2, "points", QUEUE_DEPTH)
         self._colour_publisher = self.create_publisher(Image, "image", QUEUE_DEPTH)
+        robot = self._world.robot
+        self._transforms = TransformPublisher(self, RobotDescription(robot_urdf(robot), robot))
 
     def _make_simulation(self) -> Simulation:
         settings = self._settings
@@ -119,42 +129,56 @@ class SimNode(Node):
             settings["gui"],
             settings["renderer"],
             settings["interpolate_from_desired_state"],
+            settings["allow_partial_joints_goal"],
+            settings["odometry_drift"],
         )
 
     @staticmethod
     def _make_camera(settings: SimNodeSettings) -> DepthCamera:
         kind = SENSORS.get(settings["noise"])
         sensor = NoisySensor(DepthSensor.load(kind), settings["seed"]) if kind else None
-        return DepthCamera(settings.camera, settings["camera_mount"], sensor)
+        mounted = mount_error(settings["mount_offset"], settings["mount_tilt"], settings["seed"])
+        camera, mount = settings.camera, settings["camera_mount"]
+        return DepthCamera(camera, mount, sensor, settings["depth_scale"], mounted)
 
     def _header(self, simulation: Simulation, frame: str) -> Header:
         """Return a header of the present, in simulated time if that is published."""
-        now = simulation.time if self._settings["publish_clock"] else time.time()
+        now = simulation.time if self._settings["publish_clock"] else self._now()
         return Header(stamp=stamp_of(now), frame_id=frame)
+
+    def _now(self) -> float:
+        """Return the time of the node's clock, seconds."""
+        return seconds(self.get_clock().now().to_msg())
 
     def _publish_clock(self, simulation: Simulation) -> None:
         self._clock_publisher.publish(ClockMessage(clock=stamp_of(simulation.time)))
 
     def _publish_states(self, simulation: Simulation) -> None:
         header, robot = self._header(simulation, ""), simulation.robot
-        state, names = robot.state(), list(robot.limits)
-        self._joint_publisher.publish(
-            messages.joint_state(names, state.positions, state.velocities, robot.efforts(), header)
-        )
-        if simulation.door is not None:
-            door = simulation.door.state()
+        self._transforms.publish(simulation, self._settings, header.stamp)
+        state = robot.state()
+        self._joint_publisher.publish(messages.robot_state(robot, state, header))
+        odom = Header(stamp=header.stamp, frame_id=ODOM)
+        self._odometry_publisher.publish(messages.odometry(robot, odom))
+        if (mechanism := simulation.mechanism) is not None:
+            places, rates = mechanism.positions().values(), mechanism.velocities().values()
             self._door_publisher.publish(
-                messages.joint_state(simulation.door.joint_names, door[:2], door[2:], (), header)
+                messages.joint_state(mechanism.joint_names, [*places], [*rates], (), header)
             )
+            world = Header(stamp=header.stamp, frame_id=self._settings["world_frame"])
+            force = mechanism.grasp_force()
+            self._force_publisher.publish(messages.force_on(force, world))
         self._statistics.track(
-            simulation.desired.positions - state.positions,
-            simulation.controller.progress(simulation.time),
+            robot.error(simulation.desired, state),
+            simulation.controllers.progress(simulation.time),
         )
 
     def _publish_camera(self, simulation: Simulation) -> None:
         """Publish the ground truth, and what the camera sees to those who listen."""
         settings = self._settings
         header = self._header(simulation, settings["camera_frame"])
+        # Of the very exposure, and first: whoever needs its pose need not wait or interpolate.
+        self._transforms.publish(simulation, settings, header.stamp)
         world = Header(stamp=header.stamp, frame_id=settings["world_frame"])
         self._truth_publisher.publish(
             messages.ground_truth(simulation.scenario, simulation.values(), world)
@@ -182,19 +206,9 @@ class SimNode(Node):
                 cloud_from_points(depth_to_points(depth, camera), header)
             )
 
-    def _on_trajectory(self, message: JointTrajectory) -> None:
-        try:
-            self._runner.call(lambda simulation: self._accept(simulation, message))
-        except TrajectoryError as error:
-            self._statistics.refuse(error.reason, str(error))
-            self._warnings.warn(error.reason, f"trajectory refused, {error.reason}: {error}")
-        else:
-            self._statistics.accept()
-
-    def _accept(self, simulation: Simulation, message: JointTrajectory) -> None:
-        offset = 0.0 if self._settings["publish_clock"] else simulation.time - time.time()
-        command = messages.command_from_message(message, lambda stamp: stamp + offset)
-        simulation.controller.accept(command, simulation.time)
+    def _to_simulated(self, simulation: Simulation) -> float:
+        """Return what stamps lack to be simulated time, seconds."""
+        return 0.0 if self._settings["publish_clock"] else simulation.time - self._now()
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._rebuild(self._settings)
@@ -206,6 +220,7 @@ class SimNode(Node):
         camera = self._make_camera(settings)
 
         def build(simulation: Simulation) -> None:
+            self._servers.end_goals("the world was set up anew")
             simulation.build(settings.scenario)
             self._depth_camera, self._settings = camera, settings
 

@@ -12,12 +12,17 @@ import numpy as np
 from kmn_perception.configuration.node_parameters import ParameterError
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_sim.robot.description import BASE_FOOTPRINT
+from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.robot.urdf_export import BASE_LINK
 from kmn_sim.sensors.recording import FORMATS
 from kmn_sim.world.scenario import Scenario, in_room
 
+ODOM, CAMERA_LINK = "odom", "camera_link"  # frames (REP-105, REP-103)
 OPTIONS = ("stem", "frame", "wall", "floor", "table")
 WORLD = ("model", "placement", "values", "seed", "direction", "room", "recess", *OPTIONS)
-SENSOR = ("model", "camera", "camera_mount", "noise", "seed")
+FAULTS = ("depth_scale", "mount_offset", "mount_tilt")
+SENSOR = ("model", "camera", "camera_mount", "noise", "seed", *FAULTS)
 RECORDING = ("record", "record_rate")
 
 
@@ -56,9 +61,9 @@ class SimNodeSettings:
                 f"'record' must be a file {' or '.join(FORMATS)} in a folder that exists, "
                 f"found '{record}'"
             )
+        _check_frames(values)
         model = KinematicModel.load(values["model"])
-        camera = Camera.load(values["camera"]) if values["camera"] else model.camera
-        return cls(dict(values), _scenario(model, values), camera)
+        return cls(dict(values), _scenario(model, values), _camera(model, values))
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
@@ -66,6 +71,17 @@ class SimNodeSettings:
     def differs(self, other: SimNodeSettings, names: tuple[str, ...]) -> bool:
         """Tell whether one of some parameters has another value."""
         return any(self[name] != other[name] for name in names)
+
+
+def _check_frames(values: Mapping[str, Any]) -> None:
+    """Raise `ParameterError` if two frames would have the same name."""
+    others = (ODOM, BASE_FOOTPRINT, BASE_LINK, CAMERA_LINK)
+    for name in ("world_frame", "camera_frame"):
+        if values[name] in others or values["world_frame"] == values["camera_frame"]:
+            raise ParameterError(
+                f"'{name}' must differ from the other frames ({', '.join(others)}), "
+                f"found '{values[name]}'"
+            )
 
 
 def _scenario(model: KinematicModel, values: Mapping[str, Any]) -> Scenario:
@@ -81,4 +97,12 @@ def _scenario(model: KinematicModel, values: Mapping[str, Any]) -> Scenario:
     if not values["room"]:
         return scenario
     recess = values["recess"] if values["recess"] >= 0.0 else None
-    return in_room(scenario, values["seed"], recess)
+    return in_room(scenario, values["seed"], recess, values["robot"])
+
+
+def _camera(model: KinematicModel, values: Mapping[str, Any]) -> Camera:
+    """Return the camera that is named, else the robot's own, else that of the model."""
+    if values["camera"]:
+        return Camera.load(values["camera"])
+    on_robot = values["camera_mount"] == "base"
+    return Camera.load(RobotSettings.load(values["robot"]).camera) if on_robot else model.camera

@@ -24,7 +24,7 @@ def snapshot(
 def _view(simulation: Simulation, settings: RecordingSettings) -> NDArray[np.float64]:
     """Return the pose (4, 4) of the camera that shows what is done."""
     scenario, robot, view = simulation.scenario, simulation.settings.robot, settings.door
-    if not scenario.is_door:
+    if not scenario.is_articulated:
         return look_at(settings.box.position, settings.box.target)
     x, y, _ = robot.base_names
     start = np.array([robot.home[x], robot.home[y]])

@@ -4,42 +4,46 @@ from __future__ import annotations
 
 import numpy as np
 
+from kmn_perception.model.parts import WORLD
 from kmn_sim.world.cuboid import Colour, Cuboid, Portal, cuboid
 from kmn_sim.world.scenario import Scenario
-from kmn_sim.world.settings import DoorMechanics, FloorSettings, TableSettings
+from kmn_sim.world.settings import DoorSurroundings, FloorSettings, TableSettings
 
 # Colours, RGBA.
 PANEL, HANDLE = (0.62, 0.46, 0.32, 1.0), (0.75, 0.75, 0.78, 1.0)
 FRAME, WALL, FLOOR = (0.45, 0.33, 0.24, 1.0), (0.86, 0.86, 0.83, 1.0), (0.55, 0.57, 0.6, 1.0)
+CARCASS = (0.8, 0.78, 0.74, 1.0)
 TABLE, CARTON = (0.6, 0.52, 0.42, 1.0), (0.72, 0.55, 0.36, 1.0)
 
 
-def door_cuboids(scenario: Scenario, settings: DoorMechanics) -> dict[str, list[Cuboid]]:
-    """Return the cuboids of a door's links in the object frame: of the bodies, and of ``world``.
+def object_cuboids(scenario: Scenario, settings: DoorSurroundings) -> dict[str, list[Cuboid]]:
+    """Return the cuboids of an object's links in the object frame: what joints move, and ``world``.
 
-    The stem belongs to the body that turns about its axis, the handle.
+    To the latter belong the bodies that no joint moves, and what stands around the object. The stem
+    belongs to the body that turns about its axis.
     """
-    gamma = scenario.gamma
-    colours: dict[str, Colour] = {"panel": PANEL, "handle": HANDLE}
+    gamma, action = scenario.gamma, scenario.action
+    colours: dict[str, Colour] = {action.joint.body: PANEL, action.grasp.body.name: HANDLE}
     if scenario.room is not None:
-        colours["panel"] = scenario.room.colours["panel"]
-    links = {
-        body.name: [cuboid(body.centre(gamma), body.size(gamma), colours.get(body.name, PANEL))]
-        for body in scenario.model.bodies
-    }
-    panel = links["panel"][0]
+        colours[action.joint.body] = scenario.room.colours["panel"]
+    moved = [joint.body for joint in scenario.model.joints]
+    links: dict[str, list[Cuboid]] = {name: [] for name in (WORLD, *moved)}
+    for body in scenario.model.bodies:
+        link = body.name if body.name in moved else WORLD
+        colour = colours.get(body.name, PANEL if link != WORLD else CARCASS)
+        links[link].append(cuboid(body.centre(gamma), body.size(gamma), colour))
     stem = scenario.model.stem
     if scenario.stem and stem is not None:
         links[stem.body.name].append(cuboid(*stem.cuboid(gamma), HANDLE))
-    links["world"] = _surroundings(scenario, panel, settings)
+    links[WORLD] += _surroundings(scenario, links[action.joint.body][0], settings)
     return links
 
 
-def _surroundings(scenario: Scenario, panel: Cuboid, settings: DoorMechanics) -> list[Cuboid]:
+def _surroundings(scenario: Scenario, panel: Cuboid, settings: DoorSurroundings) -> list[Cuboid]:
     """Return what stands around a door: its room, or frame and wall alone."""
-    hinge = scenario.model.joints[0]
     if scenario.room is not None:
-        side = float(np.sign(hinge.origin(scenario.gamma)[1] - panel.centre[1]))
+        hinge = scenario.action.joint.origin(scenario.gamma)
+        side = float(np.sign(hinge[1] - panel.centre[1]))
         return scenario.room.cuboids(panel, side, -1.0 if scenario.direction == "pull" else 1.0)
     frame, wall, portal = settings.frame, settings.wall, Portal(panel)
     x, found = float(panel.centre[0]), list[Cuboid]()

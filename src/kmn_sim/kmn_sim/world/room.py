@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.world.cuboid import Colour, Cuboid, Portal, cuboid_between
 from kmn_sim.world.room_settings import Limits, RoomColours, RoomSettings, RoomWall
@@ -191,14 +192,18 @@ class Way(NamedTuple):
 
     @classmethod
     def of(
-        cls, model: KinematicModel, values: NDArray[np.float64], start: tuple[float, float]
+        cls,
+        model: KinematicModel,
+        action: Action,
+        values: NDArray[np.float64],
+        start: tuple[float, float],
     ) -> Way:
         """Return the way to the door of parameters (n + m,) from a place in the world, metres."""
         theta, gamma = model.split(values)
         inverse = np.linalg.inv(model.transformation.matrix(theta))
         origin = inverse[:2, :2] @ np.array(start) + inverse[:2, 3]
-        panel, handle = model.body("panel"), model.body("handle")
-        side = float(np.sign(model.joints[0].origin(gamma)[1] - panel.centre(gamma)[1]))
+        panel, handle = model.body(action.joint.body), action.grasp.body
+        side = float(np.sign(action.joint.origin(gamma)[1] - panel.centre(gamma)[1]))
         return cls(origin, handle.centre(gamma)[:2], float(panel.size(gamma)[1]) / 2.0, side)
 
     def leaves(self, place: OnWall, edge: float, clear: float) -> bool:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.parts import WORLD, Joint
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.world.room import Room, Way
 from kmn_sim.world.room_settings import RoomSettings
@@ -26,11 +29,11 @@ class Scenario:
     Attributes
     ----------
     model
-        Kinematic model of the object; one with joints is a door.
+        Kinematic model of the object; one with an action is articulated, others are boxes.
     values
         (n + m,) morphing parameters (theta, gamma).
     direction
-        Whether a door opens towards the robot (``pull``) or away from it (``push``).
+        Whether an object opens towards the robot (``pull``) or away from it (``push``).
     stem, frame, wall
         Whether a door has a stem between lever and panel, a frame, and a wall around it.
     floor
@@ -67,11 +70,42 @@ class Scenario:
             low, high = parameter.limits
             if not low <= value <= high:
                 raise ScenarioError(f"{parameter.name} = {value:g} is outside [{low:g}, {high:g}]")
+        if self.is_articulated:
+            self._check_surroundings()
+
+    def _check_surroundings(self) -> None:
+        low, high = self.limits(self.action.joint)
+        if low >= high:
+            raise ScenarioError(
+                f"'direction': model '{self.model.name}' does not open by {self.direction}, its "
+                f"joint '{self.action.joint.name}' is limited to {list(self.action.joint.limits)}"
+            )
+        if (self.frame or self.wall) and not self.fills_opening:
+            raise ScenarioError(
+                f"'frame' and 'wall' are for doors in a wall, model '{self.model.name}' is none"
+            )
 
     @property
-    def is_door(self) -> bool:
-        """Whether the object has joints."""
-        return bool(self.model.joints)
+    def is_articulated(self) -> bool:
+        """Whether something can be done with the object."""
+        return bool(self.model.actions)
+
+    @property
+    def fills_opening(self) -> bool:
+        """Whether the object is a panel in an opening of a wall: a door."""
+        return self.is_articulated and self.action.joint.parent == WORLD
+
+    @property
+    def action(self) -> Action:
+        """What can be done with an object that is articulated."""
+        return self.model.actions[0]
+
+    def limits(self, joint: Joint) -> tuple[float, float]:
+        """Return the limits (m or rad) of a joint: what is opened stops where it is closed."""
+        low, high = joint.limits
+        if joint.name != self.action.joint.name:
+            return low, high
+        return (low, 0.0) if self.direction == "pull" else (0.0, high)
 
     @property
     def theta(self) -> NDArray[np.float64]:
@@ -84,28 +118,32 @@ class Scenario:
         return self.model.split(self.values)[1]
 
 
-def in_room(scenario: Scenario, seed: int, recess: float | None = None) -> Scenario:
+def in_room(
+    scenario: Scenario, seed: int, recess: float | None = None, robot: str | Path = ""
+) -> Scenario:
     """Return a scenario whose door stands in a room that is drawn by a seed.
 
     Parameters
     ----------
     recess
         Given instead of drawn, metres.
+    robot
+        Whose way to the door stays clear, see `RobotSettings.load`.
 
     Raises
     ------
     ScenarioError
         If the object is no door, or has frame or wall already.
     """
-    if not scenario.is_door:
+    if not scenario.fills_opening:
         raise ScenarioError(
-            f"'room' is for doors, model '{scenario.model.name}' has no joints: leave it out"
+            f"'room' is for doors in a wall, model '{scenario.model.name}' is none: leave it out"
         )
     if scenario.frame or scenario.wall:
         raise ScenarioError("a 'room' has its own frame and wall: leave 'frame' and 'wall' out")
-    robot = RobotSettings.load()
-    x, y = (robot.home[name] for name in robot.base_names[:2])
-    way = Way.of(scenario.model, scenario.values, (x, y))
+    settings = RobotSettings.load(robot)
+    x, y = (settings.home[name] for name in settings.base_names[:2])
+    way = Way.of(scenario.model, scenario.action, scenario.values, (x, y))
     return replace(
         scenario, room=Room.draw(RoomSettings.load(), scenario.direction, seed, way, recess)
     )

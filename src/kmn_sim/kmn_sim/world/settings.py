@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from pydantic import Field
@@ -36,61 +37,6 @@ class PhysicsSettings(NamedTuple):
     light: LightSettings
 
 
-class PanelSettings(NamedTuple):
-    """Mass of the panel, kg."""
-
-    mass: Positive
-
-
-class HingeSettings(NamedTuple):
-    """Coulomb friction of the hinge, N m, and the angle from closed to its stop, radians."""
-
-    friction: NonNegative
-    opening: NonNegative
-
-
-class HandleSettings(NamedTuple):
-    """The handle.
-
-    Attributes
-    ----------
-    mass
-        With its stem, kg.
-    spring, damping
-        Of the spring that turns it back, N m/rad and N m s/rad.
-    preload, preload_width
-        Torque with which the spring begins, N m, and the angle over which it sets in, radians.
-    friction, spinning_friction
-        Of its surface.
-    """
-
-    mass: Positive
-    spring: NonNegative
-    preload: NonNegative
-    preload_width: Positive
-    damping: NonNegative
-    friction: NonNegative
-    spinning_friction: NonNegative
-
-
-class LatchSettings(NamedTuple):
-    """The latch.
-
-    Attributes
-    ----------
-    release
-        Angle of the handle at which it lets go, radians.
-    catch
-        Angle of the hinge within which it catches, radians.
-    torque
-        About the hinge, that it bears, N m.
-    """
-
-    release: NonNegative
-    catch: NonNegative
-    torque: NonNegative
-
-
 class FrameSettings(NamedTuple):
     """Thickness of the door's frame, and its distance to the panel, metres."""
 
@@ -106,13 +52,9 @@ class WallSettings(NamedTuple):
     thickness: Positive
 
 
-class DoorMechanics(NamedTuple):
-    """Mechanics of the door, and what stands around it."""
+class DoorSurroundings(NamedTuple):
+    """What stands around a door."""
 
-    panel: PanelSettings
-    hinge: HingeSettings
-    handle: HandleSettings
-    latch: LatchSettings
     frame: FrameSettings
     wall: WallSettings
 
@@ -145,19 +87,19 @@ class WorldSettings(NamedTuple):
     """All numbers of the simulated world."""
 
     physics: PhysicsSettings
-    door: DoorMechanics
+    door: DoorSurroundings
     box: BoxSettings
     robot: RobotSettings
 
     @classmethod
-    def load(cls) -> WorldSettings:
-        """Read the shipped files; raise ``ConfigurationError`` if one is wrong."""
+    def load(cls, robot: str | Path = "") -> WorldSettings:
+        """Read the shipped files, and a robot's; raise ``ConfigurationError`` if one is wrong."""
         physics, door, box = (
             resources.find("config/simulation", name) for name in ("physics", "door", "box")
         )
         return cls(
             load_settings(PhysicsSettings, physics),
-            load_settings(DoorMechanics, door),
+            load_settings(DoorSurroundings, door),
             load_settings(BoxSettings, box),
-            RobotSettings.load(),
+            RobotSettings.load(robot),
         )

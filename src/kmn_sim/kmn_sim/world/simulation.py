@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.configuration.robot_parts import velocity_controller
 from kmn_sim.control.interpolation import State
-from kmn_sim.control.trajectory_controller import TrajectoryController
-from kmn_sim.robot.pr2_model import pr2_urdf
+from kmn_sim.control.robot_controllers import RobotControllers
+from kmn_sim.control.velocity_controller import VelocityController
+from kmn_sim.robot.robot_model import robot_urdf
 from kmn_sim.robot.simulated_robot import SimulatedRobot
 from kmn_sim.world.carton import Carton
 from kmn_sim.world.cuboid import MATT, Cuboid
-from kmn_sim.world.cuboids import FLOOR, door_cuboids, floor_cuboid, table_cuboids
-from kmn_sim.world.door import Door
+from kmn_sim.world.cuboids import FLOOR, floor_cuboid, object_cuboids, table_cuboids
+from kmn_sim.world.mechanism import Mechanism
 from kmn_sim.world.physics import Physics
 from kmn_sim.world.renderer import Renderer
 from kmn_sim.world.scenario import Scenario
@@ -37,12 +40,16 @@ class Simulation:
         What renders the camera's images: ``egl`` or ``software``.
     from_desired_state
         Whether a new trajectory starts from the desired state, else from the measured one.
+    allow_partial
+        Whether a trajectory need not name all joints.
+    odometry_drift
+        Metres by which the robot's odometry errs for each metre driven.
 
     Attributes
     ----------
     time
         Simulated seconds since the start; it goes on when the scenario changes.
-    door, carton
+    mechanism, carton
         The object, one of the two.
     physics
         Client of the physics engine.
@@ -50,8 +57,8 @@ class Simulation:
         Renders what cameras see of the world.
     settings
         Numbers of the world.
-    robot, controller, desired
-        The robot, what it follows, and the state that is desired of it in the last step.
+    robot, controllers, desired
+        The robot, what moves it, and the state that is desired of it in the last step.
     floor
         Height of the floor, metres.
     """
@@ -63,9 +70,12 @@ class Simulation:
         gui: bool = False,
         renderer: str = "egl",
         from_desired_state: bool = True,
+        allow_partial: bool = False,
+        odometry_drift: float = 0.0,
     ) -> None:
-        self.settings, self._urdf = settings, pr2_urdf(settings.robot)
-        self._from_desired_state = from_desired_state
+        self.settings, self._urdf = settings, robot_urdf(settings.robot)
+        self._from_desired_state, self._allow_partial = from_desired_state, allow_partial
+        self._odometry_drift = odometry_drift
         self.physics: Any = Physics(gui)
         # Before there are bodies: a renderer does not know of those that were there before it.
         self.renderer = Renderer(self.physics, renderer, settings.physics.light)
@@ -89,35 +99,59 @@ class Simulation:
             numSolverIterations=settings.physics.solver_iterations,
             deterministicOverlappingPairs=1,
         )
-        self.door: Door | None = None
+        self.mechanism: Mechanism | None = None
         self.carton: Carton | None = None
-        if scenario.is_door:
-            self.door, start = Door(physics, scenario, settings.door), {}
+        if scenario.is_articulated:
+            self.mechanism, start = Mechanism(physics, scenario, settings.door), {}
         else:
             self.carton = Carton(physics, scenario, settings.box.box)
             start = dict(zip(settings.robot.base_names, settings.box.robot, strict=True))
         self._stand(self._table())
         self.floor = -settings.box.table.height if scenario.table else 0.0
         self.robot = SimulatedRobot(
-            physics, self._urdf, settings.robot, start, self.floor, self.step_time
+            physics,
+            self._urdf,
+            settings.robot,
+            start,
+            self.floor,
+            self.step_time,
+            self._odometry_drift,
         )
         if scenario.floor:
             ground = self._stand(self._ground())
             # The robot's base moves in a plane: its wheels do not touch the ground.
             for link in range(-1, physics.getNumJoints(self.robot.body)):
                 physics.setCollisionFilterPair(ground, self.robot.body, -1, link, 0)
-        self.controller = TrajectoryController(
-            self.robot.limits, self.robot.state().positions, self._from_desired_state
-        )
+        self.controllers = self._make_controllers()
         self.desired = State.at_rest(self.robot.state().positions)
+
+    def _make_controllers(self) -> RobotControllers:
+        """Return controllers that hold the robot where it is."""
+        settings, base = self.settings.robot, None
+        if velocity_controller(settings.controllers):
+            speeds = np.array([settings.joints[name].velocity for name in settings.base_names])
+            base = VelocityController(speeds, settings.simulation.velocity_control)
+        return RobotControllers(
+            {
+                name: each.joints
+                for name, each in settings.controllers.items()
+                if each.type != "velocity"
+            },
+            self.robot.limits,
+            self.robot.state().positions,
+            self.robot.continuous,
+            self._from_desired_state,
+            self._allow_partial,
+            base,
+        )
 
     def step(self) -> None:
         """Advance the world by one step."""
         measured = self.robot.state()
-        self.desired = self.controller.sample(self.time, measured)
+        self.desired = self.controllers.sample(self.time, measured)
         self.robot.update(self.desired, measured)
-        if self.door is not None:
-            self.door.update()
+        if self.mechanism is not None:
+            self.mechanism.update()
         self.physics.stepSimulation()
         self._steps += 1
 
@@ -133,14 +167,13 @@ class Simulation:
         return self.carton.values()
 
     def unit_cubes(self) -> NDArray[np.float64]:
-        """Return all cuboids but the robot as maps (B, 4, 4) of the unit cube, door closed."""
+        """Return all cuboids but the robot as maps (B, 4, 4) of the unit cube, closed."""
         scenario = self.scenario
         cubes = list(scenario.model.unit_cubes(*scenario.model.split(self.values())))
-        if scenario.is_door:
+        if scenario.is_articulated:
             pose = scenario.model.transformation.matrix(scenario.theta)
-            links = door_cuboids(scenario, self.settings.door)
-            parts = [*links["world"], *links["handle"][1:]]
-            cubes += [part.unit_cube(pose) for part in parts]
+            parts = chain(*object_cuboids(scenario, self.settings.door).values())
+            cubes = [part.unit_cube(pose) for part in parts]
         around = [*self._table(), *self._ground()]
         return np.array([*cubes, *(part.unit_cube(np.eye(4)) for part in around)])
 

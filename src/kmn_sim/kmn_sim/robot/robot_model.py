@@ -1,4 +1,4 @@
-"""The generated model of the PR2, kept in the user's cache."""
+"""The generated models of robots, kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from kmn_perception.configuration.section import ConfigurationError
-from kmn_sim.robot import pr2_export
+from kmn_sim.robot import urdf_export
 from kmn_sim.robot.settings import RobotSettings
 
 HINT = "install it with: make setup-simulation"
@@ -28,23 +28,25 @@ def cache_directory() -> Path:
     return Path(root) / "kmn_sim"
 
 
-def pr2_urdf(settings: RobotSettings) -> Path:
-    """Return the URDF of the PR2, which the first call with these settings generates.
+def robot_urdf(settings: RobotSettings) -> Path:
+    """Return the URDF of a robot, which the first call with these settings generates.
 
     Raises
     ------
     RobotModelError
         If it is not there and the package robotic, from which it is made, is missing.
+    ConfigurationError
+        If the robot's file names what its model lacks.
     """
-    folder = cache_directory() / f"pr2-{_key(settings)}"
-    file = folder / "pr2.urdf"
+    folder = cache_directory() / f"{settings.name}-{_key(settings)}"
+    file = folder / urdf_export.URDF
     if file.is_file():
         return file
     folder.parent.mkdir(parents=True, exist_ok=True)
     # Made aside and moved as a whole, so that another process never sees half of it.
-    made = Path(tempfile.mkdtemp(prefix="pr2-", dir=folder.parent))
+    made = Path(tempfile.mkdtemp(prefix=f"{settings.name}-", dir=folder.parent))
     try:
-        pr2_export.export(settings, made)
+        urdf_export.export(settings, made)
         made.rename(folder)
     except (ImportError, OSError) as error:
         if file.is_file():  # another process was faster
@@ -60,16 +62,16 @@ def _key(settings: RobotSettings) -> str:
     try:
         source = version("robotic")
     except PackageNotFoundError as error:
-        raise RobotModelError(f"the package robotic with the PR2 is missing; {HINT}") from error
+        raise RobotModelError(f"the package robotic with the robot is missing; {HINT}") from error
     digest = sha256(repr(replace(settings, planning=None)).encode())
-    digest.update(Path(pr2_export.__file__).read_bytes())
+    digest.update(Path(urdf_export.__file__).read_bytes())
     return f"{source}-{digest.hexdigest()[:12]}"
 
 
 def main() -> int:
     """Make the model ready, as the set-up does."""
     try:
-        print(pr2_urdf(RobotSettings.load()))
+        print(robot_urdf(RobotSettings.load()))
     except (RobotModelError, ConfigurationError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kmn_sim.robot import pr2_model
-from kmn_sim.robot.pr2_export import link_name
+from kmn_sim.robot import robot_model
 from kmn_sim.robot.settings import RobotSettings
+from kmn_sim.robot.urdf_export import link_name
 from kmn_sim.world.simulation import Simulation
 
 robotic = pytest.importorskip("robotic")
@@ -34,7 +34,7 @@ def test_forward_kinematics_is_that_of_the_source(simulate: Simulate) -> None:
                     simulation.physics.resetJointState(robot.body, robot.link(follower), value)
             values[name] = value
         base = [values.pop(name) for name in settings.base_names]
-        source.getFrame(settings.base).setJointState(base)
+        source.getFrame(settings.base.frame).setJointState(base)
         for name, value in values.items():
             source.getFrame(name).setJointState([value])
         for name in (*settings.arm_names, *settings.finger_names):
@@ -63,7 +63,7 @@ def test_efforts_and_masses_reach_the_engine(simulate: Simulate) -> None:
         info = simulation.physics.getJointInfo(robot.body, robot.link(name))
         assert info[10:12] == (motor.effort, motor.velocity)
         links = {"base_x": "base_x_link", "base_y": "base_y_link", "base_yaw": "base_link"}
-        assert info[12].decode() == links.get(name, link_name(name, settings.base))
+        assert info[12].decode() == links.get(name, link_name(name, settings.base.frame))
     masses = [
         simulation.physics.getDynamicsInfo(robot.body, link)[0]
         for link in range(simulation.physics.getNumJoints(robot.body))
@@ -79,14 +79,14 @@ def test_a_missing_package_is_named_with_what_to_do(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setitem(sys.modules, "robotic", None)
-    with pytest.raises(pr2_model.RobotModelError, match="make setup-simulation"):
-        pr2_model.pr2_urdf(RobotSettings.load())
+    with pytest.raises(robot_model.RobotModelError, match="make setup-simulation"):
+        robot_model.robot_urdf(RobotSettings.load())
     assert list((tmp_path / "kmn_sim").iterdir()) == []
 
 
 def test_the_model_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    file = pr2_model.pr2_urdf(RobotSettings.load())
+    file = robot_model.robot_urdf(RobotSettings.load())
     made = file.stat().st_mtime_ns
-    assert pr2_model.pr2_urdf(RobotSettings.load()).stat().st_mtime_ns == made
+    assert robot_model.robot_urdf(RobotSettings.load()).stat().st_mtime_ns == made
     assert file.parent.parent == tmp_path / "kmn_sim"

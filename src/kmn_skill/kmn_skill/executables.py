@@ -4,7 +4,9 @@
 EXECUTABLES = {
     "skill_node": ("kmn_skill.ros.skill_node", "simulation"),
     "open_door": ("kmn_skill.experiments.open_door", "simulation"),
+    "check_robot": ("kmn_skill.experiments.check_robot", "simulation"),
     "evaluate": ("kmn_skill.experiments.evaluate", "simulation"),
+    "kill_nodes": ("kmn_skill.experiments.kill_nodes", "simulation"),
     "demo": ("kmn_skill.experiments.demo", "simulation"),
     "plan_doors": ("kmn_skill.experiments.plan_doors", "simulation"),
     "make_prototypes": ("kmn_skill.experiments.make_prototypes", "simulation"),

@@ -10,72 +10,75 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ament_index_python.packages import get_package_prefix, get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from ament_index_python.packages import (
+    PackageNotFoundError,
+    get_package_prefix,
+    get_package_share_directory,
+)
+from launch import Action, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, Shutdown
 from launch.conditions import IfCondition
-from launch.substitutions import Command, LaunchConfiguration
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, SetParameter
-from launch_ros.parameter_descriptions import ParameterValue
 
-from kmn_perception.model.camera import Camera
-from kmn_perception.model.rotation import quaternion_from_matrix
+from kmn_perception.ros.launch_arguments import (
+    TRUTHS,
+    parameter_argument,
+    parameter_value,
+    warn_of_foreign,
+)
 
-ARGUMENTS = {
-    "seed": ("0", "seed of the random door and of the noise"),
-    "direction": ("pull", "how the door opens: pull or push"),
-    "noise": ("kinect", "what the sensor adds to the exact depth: none or kinect"),
-    "rviz": ("true", "show it in RViz"),
-}
+# Parameters of sim_node, with a default of its own where there is one.
+SIMULATED = {"robot": None, "seed": None, "direction": None, "noise": "kinect"}
+RVIZ = "rviz"
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the three nodes, with what RViz needs to show them."""
-    chosen = {name: LaunchConfiguration(name) for name in ("seed", "direction", "noise")}
-    view = Path(get_package_share_directory("kmn_skill")) / "rviz/door_demo.rviz"
-    describe = Path(get_package_prefix("kmn_sim")) / "lib/kmn_sim/robot_description"
-    robot = ParameterValue(Command([str(describe)]), value_type=str)
+    """Return the three nodes, and RViz: sim_node tells it of the robot and of all frames."""
+    chosen = {name: parameter_value("sim_node", name) for name in SIMULATED}
+    world = {"placement": "random", "publish_clock": True, **chosen}
     return LaunchDescription(
         [
-            *(
-                DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, (default, text) in ARGUMENTS.items()
+            *(parameter_argument("sim_node", *each) for each in SIMULATED.items()),
+            DeclareLaunchArgument(
+                RVIZ,
+                default_value="true",
+                choices=TRUTHS,
+                description="Show it in RViz, where that is installed.",
             ),
+            warn_of_foreign([*SIMULATED, RVIZ]),
             # Simulated time: the simulation may be slower than the system's.
             SetParameter("use_sim_time", True),
-            _node(
-                "kmn_sim",
-                "sim_node",
-                parameters=[{"placement": "random", "publish_clock": True, **chosen}],
-            ),
+            _node("kmn_sim", "sim_node", world),
             _node("kmn_perception", "morph_node"),
-            _node("kmn_skill", "skill_node"),
-            _node("tf2_ros", "static_transform_publisher", arguments=_camera_transform()),
-            _node(
-                "robot_state_publisher",
-                "robot_state_publisher",
-                parameters=[{"robot_description": robot}],
-            ),
-            _node(
-                "rviz2",
-                "rviz2",
-                arguments=["-d", str(view)],
-                condition=IfCondition(LaunchConfiguration("rviz")),
-            ),
+            _node("kmn_skill", "skill_node", {"robot": chosen["robot"]}),
+            _rviz(IfCondition(LaunchConfiguration(RVIZ))),
         ]
     )
 
 
-def _node(package: str, executable: str, **options: object) -> Node:
-    return Node(package=package, executable=executable, output="screen", **options)
-
-
-def _camera_transform() -> list[str]:
-    """Return where the door's canonical camera is in the world."""
-    pose = Camera.load("door").pose
-    place = zip(("--x", "--y", "--z"), pose[:3, 3], strict=True)
-    turned = zip(
-        ("--qx", "--qy", "--qz", "--qw"), quaternion_from_matrix(pose[:3, :3]), strict=True
+def _node(package: str, executable: str, parameters: dict[str, object] | None = None) -> Node:
+    """Return one of the nodes, without which the others are of no use."""
+    return Node(
+        package=package,
+        executable=executable,
+        output="screen",
+        parameters=[parameters or {}],
+        on_exit=Shutdown(reason=f"{executable} ended"),
     )
-    numbers = [text for name, value in (*place, *turned) for text in (name, str(value))]
-    return [*numbers, "--frame-id", "world", "--child-frame-id", "camera_optical_frame"]
+
+
+def _rviz(condition: IfCondition) -> Action:
+    try:
+        get_package_prefix("rviz2")
+    except PackageNotFoundError:
+        text = "rviz2 is not installed, nothing is shown; install ros-jazzy-rviz2, or rviz:=false"
+        return LogInfo(msg=text, condition=condition)
+    view = Path(get_package_share_directory("kmn_skill")) / "rviz/door_demo.rviz"
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        output="screen",
+        arguments=["-d", str(view)],
+        condition=condition,
+    )

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import ExecutionError
+from kmn_skill.execution.gripper_commands import gripper_commands
 from kmn_skill.execution.plan_execution import Execution, ExecutionSettings, Part, sample
 from kmn_skill.execution.states import WorldState
 from kmn_skill.planning.plan import Phase, Plan, PlanReport
@@ -17,6 +18,7 @@ SETTINGS = ExecutionSettings(
     start_delay=0.3,
     part_duration=2.0,
     part_overlap=0.4,
+    hold_duration=0.1,
     settle_time=0.5,
     position_tolerance=0.05,
     angle_tolerance=0.2,
@@ -58,7 +60,7 @@ PLAN = make_plan()
 def state(time: float) -> WorldState:
     """Return the state of a robot and a door that follow exactly."""
     elapsed = np.clip(time - START, 0.0, 10.0)
-    hinge, handle = sample(PLAN.times, PLAN.door, elapsed)
+    hinge, handle = sample(PLAN.times, PLAN.object_joints, elapsed)
     return WorldState(time, motion(np.array([elapsed]))[0], hinge, handle)
 
 
@@ -75,46 +77,63 @@ def run(period: float = 0.02, settings: ExecutionSettings = SETTINGS) -> list[tu
 
 
 def test_the_parts_hold_all_points_of_the_plan() -> None:
-    starts = [part.start - START for _, part in run()]
-    np.testing.assert_allclose(starts, [0.0, 2.0, 4.0, 6.0, 8.0], atol=1e-9)
     for _, part in run():
-        times = part.times + part.start - START
-        np.testing.assert_allclose(part.positions, motion(times), atol=1e-9)
-    covered = np.concatenate([part.times + part.start - START for _, part in run()])
-    np.testing.assert_allclose(np.unique(covered.round(6)), PLAN.times[1:], atol=1e-6)
+        assert part.start == START
+        np.testing.assert_allclose(part.positions, motion(part.times), atol=1e-9)
+    covered = np.concatenate([part.times for _, part in run()])
+    np.testing.assert_allclose(np.unique(covered.round(6)), PLAN.times, atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("period", "duration"), [(0.004, 0.5), (0.13, 0.5), (0.02, 2.0), (0.9, 3.3), (0.9, 60.0)]
 )
-def test_each_part_comes_after_the_former_began_and_before_it_ends(
+def test_each_part_replaces_the_former_without_losing_a_point(
     period: float, duration: float
 ) -> None:
+    """It comes before the former one has to stop, and holds all that is left of it."""
     sent = run(period, replace(SETTINGS, part_duration=duration))
     for (_, former), (time, part) in zip(sent, sent[1:], strict=False):
-        assert former.start <= time <= part.start
-        end = min(part.start + SETTINGS.part_overlap, START + 10.0)
-        assert end <= former.start + former.times[-1] + 1e-9
+        assert time <= START + former.times[-1] - SETTINGS.part_overlap
+        assert START + part.times[0] <= max(time, START) < START + part.times[1] + 1e-9
+        left = former.times[former.times >= part.times[0]]
+        np.testing.assert_array_equal(part.times[: len(left)], left)
+        assert part.times[-1] > former.times[-1]
 
 
 def test_each_part_ends_at_rest_and_within_the_plan() -> None:
     for _, part in run():
-        assert (part.times > 0.0).all()
         assert (np.diff(part.times) > 0.0).all()
         assert (part.velocities[-1] == 0.0).all()
-    last = run()[-1][1]
-    assert last.start + last.times[-1] == pytest.approx(START + 10.0)
+    assert run()[-1][1].times[-1] == pytest.approx(10.0)
+
+
+def test_a_part_begins_where_a_robot_with_late_states_has_passed() -> None:
+    execution = Execution(PLAN, BEGIN, SETTINGS)
+    execution.step(BEGIN, state(BEGIN))
+    part = execution.step(START + 1.5, state(START + 1.05)).part
+    assert part is not None
+    assert part.times[0] == pytest.approx(1.0)
+
+
+def test_it_knows_where_the_robot_is_by_the_parts_that_were_sent() -> None:
+    execution = Execution(PLAN, BEGIN, SETTINGS)
+    execution.step(BEGIN, state(BEGIN))
+    for elapsed, there in ((-0.2, 0.0), (1.55, 1.55), (20.0, 2.4)):
+        expected = motion(np.array([there]))[0]
+        np.testing.assert_allclose(execution.position(START + elapsed), expected, atol=1e-3)
 
 
 def test_it_says_where_it_is() -> None:
     execution = Execution(PLAN, BEGIN, SETTINGS)
     for elapsed, phase in ((-0.2, "reach"), (3.9, "reach"), (5.0, "grasp"), (7.0, "press")):
         step = execution.step(START + elapsed, state(START + elapsed))
-        assert step.phase == phase
+        found, angles = execution.planned(START + elapsed)
+        assert found == phase
+        np.testing.assert_allclose(angles, state(START + elapsed)[2:])
         assert step.progress == pytest.approx(max(elapsed, 0.0) / 10.0)
     for elapsed, finished in ((9.0, False), (10.4, False), (10.6, True)):
         step = execution.step(START + elapsed, state(START + elapsed))
-        assert (step.phase, step.finished) == ("open", finished)
+        assert (execution.planned(START + elapsed)[0], step.finished) == ("open", finished)
 
 
 def failure(elapsed: float, **changes: object) -> str:
@@ -157,3 +176,13 @@ def test_states_that_are_old_are_compared_with_what_was_then() -> None:
     Execution(PLAN, BEGIN, replace(SETTINGS, angle_tolerance=0.01, position_tolerance=0.01)).step(
         START + 5.5, state(START + 5.0)
     )
+
+
+def test_a_gripper_is_told_each_time_that_it_opens_or_closes() -> None:
+    positions = np.array([0.1, 0.1, 0.3, 0.5, 0.5, 0.2, 0.1, 0.101, 0.1, 0.1])[:, None]
+    times = np.arange(10.0).astype(np.float64)
+    part = Part(100.0, times, positions, np.zeros_like(positions))
+    assert gripper_commands(part) == [(101.0, 0.5), (104.0, 0.1)]
+    opening = Part(100.0, times[:3], positions[:3], np.zeros((3, 1)))
+    assert gripper_commands(opening) == [(101.0, 0.3)]
+    assert gripper_commands(part._replace(positions=0.0 * positions)) == []

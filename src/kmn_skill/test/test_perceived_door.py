@@ -10,15 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.door_observation import DoorObservation, when_closed
 from kmn_skill.execution.errors import DoorError
-from kmn_skill.execution.grasp_uncertainty import grasp_deviations, grasp_quantities
-from kmn_skill.execution.perceived_door import (
-    AcceptanceSettings,
-    DoorObservation,
-    PerceivedDoor,
-    when_closed,
-)
-from kmn_skill.planning.kinematics import moved_cubes
+from kmn_skill.execution.grasp_quantities import grasp_deviations, grasp_quantities
+from kmn_skill.execution.perceived_door import AcceptanceSettings, PerceivedDoor
 
 MODEL = KinematicModel.load("door")
 NAMES = tuple(parameter.name for parameter in MODEL.parameters)
@@ -170,7 +165,7 @@ def test_deviations_are_those_of_samples() -> None:
 @pytest.mark.parametrize("angle", [-0.5, 0.2])
 def test_a_door_seen_ajar_is_shut_again(angle: float) -> None:
     # The panel of the closed door, turned about the hinge, is the panel of the parameters seen.
-    panel = moved_cubes(MODEL, VALUES, (angle, 0.0))[0]
+    panel = MODEL.moved_cubes(VALUES, {"hinge": angle})[0]
     theta, gamma = MODEL.split(VALUES)
     local = np.linalg.inv(MODEL.transformation.matrix(theta)) @ MODEL.unit_cubes(theta, gamma)[0]
     ajar = MODEL.transformation.read_back(panel @ np.linalg.inv(local))
@@ -183,9 +178,52 @@ def test_a_body_moves_on_a_circle_about_its_joint() -> None:
     theta, gamma = MODEL.split(VALUES)
     hinge = MODEL.transformation.matrix(theta) @ [*MODEL.joints[0].origin(gamma), 1.0]
     for angle in (-0.9, 0.4):
-        shut, moved = (moved_cubes(MODEL, VALUES, (a, 0.0))[1][:2, 3] for a in (0.0, angle))
+        shut, moved = (MODEL.moved_cubes(VALUES, {"hinge": a})[1][:2, 3] for a in (0.0, angle))
         before, after = (complex(*(place - hinge[:2])) for place in (shut, moved))
         assert np.angle(after / before) == pytest.approx(angle)
         assert abs(after) == pytest.approx(abs(before))
-    pressed = moved_cubes(MODEL, VALUES, (0.0, -0.7))[1]
-    assert pressed[2, 3] < moved_cubes(MODEL, VALUES, (0.0, 0.0))[1][2, 3] - 0.01  # downwards
+    pressed = MODEL.moved_cubes(VALUES, {"handle": -0.7})[1]
+    assert pressed[2, 3] < MODEL.moved_cubes(VALUES, {})[1][2, 3] - 0.01  # downwards
+
+
+def lacking(time: float, values: NDArray[np.float64] = VALUES, **changes: Any) -> DoorObservation:
+    return seen(time, values, problem="no handle is seen", lacks_handle=True, **changes)
+
+
+def test_a_door_without_a_handle_is_not_relied_upon_but_tells_where_to_look() -> None:
+    made = door()
+    for time in range(3):
+        assert made.without_handle(float(time)) is None
+        with pytest.raises(DoorError, match="no handle is seen") as raised:
+            made.add(lacking(float(time), VALUES + 0.001 * time))
+        assert raised.value.reason == "handle_not_seen"
+    assert made.without_handle(2.0) == pytest.approx(VALUES + 0.001)
+    assert made.without_handle(3.5) is None  # too old
+    made.add(seen(3.0))
+    assert made.without_handle(3.0) is None
+
+
+@pytest.mark.parametrize("wrong", [{"frame": "map"}, {"values": np.full(7, np.nan)}])
+def test_what_lacks_more_than_its_handle_tells_nothing(wrong: dict[str, Any]) -> None:
+    made = door()
+    for time in range(3):
+        with pytest.raises(DoorError):
+            made.add(lacking(float(time))._replace(**wrong))
+    assert made.without_handle(2.0) is None
+
+
+def test_only_the_object_that_is_chosen_is_relied_on() -> None:
+    door = PerceivedDoor(MODEL, "world", SETTINGS)
+    other = VALUES + [0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    for time in (0.0, 0.1, 0.2, 0.3, 0.4):
+        door.add(seen(time, VALUES, number=1))
+    assert door.choose(2)  # what was seen before may be of others
+    with pytest.raises(DoorError):
+        door.values(0.4)
+    for time in (0.5, 0.6, 0.7, 0.8, 0.9):
+        door.add(seen(time, VALUES, number=1))
+        door.add(seen(time, other, number=2))
+    np.testing.assert_allclose(door.values(0.9), other)
+    assert not door.choose(2)
+    assert not door.choose(0)
+    np.testing.assert_allclose(door.values(0.9), other)

@@ -17,7 +17,6 @@ from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning import layout
 from kmn_skill.planning.check import PlanRejected, check
-from kmn_skill.planning.kinematics import moved_cubes
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planner import Planner
@@ -61,7 +60,7 @@ def test_the_planner_plans_for_the_model_that_it_is_given(other: KinematicModel)
     setup = PlanningSetup.load(other)
     theta, gamma = other.split(other.prototype)
     request = PlanRequest(theta, gamma, setup.robot.home, np.zeros(2), -0.7, OPEN_TO)
-    with Planner(setup, Prototypes.load()) as planner:
+    with Planner(setup, Prototypes.load("door")) as planner:
         plan = planner.plan(request)
     world = World(setup, theta, gamma)
     assert check(plan, request, world).contact_error < 1e-3
@@ -69,9 +68,9 @@ def test_the_planner_plans_for_the_model_that_it_is_given(other: KinematicModel)
         check(plan, request, World(PlanningSetup.load(DOOR), theta, gamma))
     # The hand is at the lever of the kinematic model.
     grasped = plan.phase(PhaseName.PRESS).first
-    positions = np.hstack([plan.positions, plan.door])[grasped]
+    positions = np.hstack([plan.positions, plan.object_joints])[grasped]
     place = world.poses(positions[None], ["l_wrist_roll_joint"])[0, 0, 2, 3]
-    lever = moved_cubes(other, other.prototype, (0.0, 0.0))[1][2, 3]
+    lever = other.moved_cubes(other.prototype, {})[1][2, 3]
     assert place == pytest.approx(lever, abs=0.02)
 
 
@@ -83,32 +82,22 @@ def test_object_and_robot_can_be_sent_to_another_process() -> None:
     np.testing.assert_array_equal(sent.model.limits, setup.model.limits)
 
 
-def test_a_model_without_a_handle_is_refused() -> None:
-    with pytest.raises(ConfigurationError, match="'box_a' must have two joints, hinge and handle"):
+def test_a_model_without_actions_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="'box_a' has no 'actions'"):
         PlanningSetup.load(KinematicModel.load("box_a"))
-
-
-def test_a_model_whose_second_joint_moves_another_body_is_refused(tmp_path: Path) -> None:
-    def rename(values: dict[str, Any]) -> None:
-        values["bodies"]["flap"] = values["bodies"].pop("handle")
-        values["joints"]["handle"]["body"] = "flap"
-
-    model = KinematicModel.load(edited("config/models", "door", rename, tmp_path))
-    with pytest.raises(ConfigurationError, match="second moves 'handle'; .* move: panel, flap"):
-        PlanningSetup.load(model)
 
 
 def test_solutions_for_other_joints_are_refused_with_both() -> None:
     setup = PlanningSetup.load(DOOR)
-    solutions = replace(Prototypes.load(), joints=("slide", *setup.joint_names[1:]))
+    solutions = replace(Prototypes.load("door"), joints=("slide", *setup.joint_names[1:]))
     with pytest.raises(ConfigurationError, match=r"joints slide, .*; those of .* are base_x, .*"):
         Planner(setup, solutions)
 
 
 def test_solutions_are_read_as_they_were_saved(tmp_path: Path) -> None:
-    solutions = Prototypes.load()
+    solutions = Prototypes.load("door")
     solutions.save(tmp_path / "mine.json")
-    found = Prototypes.load(tmp_path / "mine.json")
+    found = Prototypes.load(str(tmp_path / "mine.json"))
     assert found.joints == solutions.joints == PlanningSetup.load(DOOR).joint_names
     assert found.solutions.keys() == solutions.solutions.keys()
     for name, known in solutions.solutions.items():
@@ -119,7 +108,7 @@ def test_solutions_are_read_as_they_were_saved(tmp_path: Path) -> None:
 
 def test_the_solutions_begin_at_the_robot_s_home() -> None:
     home = RobotModel.load("pr2").home
-    for known in Prototypes.load().solutions.values():
+    for known in Prototypes.load("door").solutions.values():
         for _, path in known:
             np.testing.assert_allclose(path[0, layout.ROBOT], home)
 
@@ -144,6 +133,27 @@ def remove(*keys: str) -> Callable[[dict[str, Any]], None]:
             lambda v: v["joints"]["base_y"].update(planned=[0.6, 0.0]),
             r"planned\[1\] must be",
         ),
+        (lambda v: v.update(continuous=["thumb"]), "continuous: there is no joint 'thumb'"),
+        (
+            lambda v: v["controllers"]["base"].update(type="gripper_command"),
+            "a gripper_command is for 'l_gripper_l_finger_joint' alone, found base_x",
+        ),
+        (
+            lambda v: v["controllers"]["arm"].update(type="velocity"),
+            "controllers: arm: a velocity is for 'base_x, base_y, base_yaw' alone, found l_should",
+        ),
+        (
+            lambda v: (
+                v["controllers"]["base"].update(type="velocity"),
+                v["continuous"].remove("base_yaw"),
+            ),
+            "continuous: must name 'base_yaw', which odometry tells within one turn",
+        ),
+        (
+            lambda v: v["controllers"]["arm"]["joints"].append("base_x"),
+            "controllers: each joint must have one, found base_x",
+        ),
+        (remove("controllers", "gripper"), "controllers: each joint must have one, found base_x"),
         (lambda v: v.update(wheels=4), "unknown key 'wheels'"),
     ],
 )
@@ -155,8 +165,8 @@ def test_a_wrong_robot_is_refused_with_the_key(
 
 
 def test_a_wrong_policy_is_refused_with_the_key(tmp_path: Path) -> None:
-    file = edited("config/skill", "door", lambda v: v["grasp"].update(axis="w"), tmp_path)
-    with pytest.raises(ConfigurationError, match=r"door.yaml: grasp: 'axis' .*found 'w'"):
+    file = edited("config/skill", "policy", lambda v: v["policy"].update(margin=-1.0), tmp_path)
+    with pytest.raises(ConfigurationError, match=r"policy.yaml: policy: 'margin' .*found -1.0"):
         SkillSettings.load(file)
 
 
@@ -164,11 +174,11 @@ def test_a_wrong_policy_is_refused_with_the_key(tmp_path: Path) -> None:
 def test_columns_are_those_of_any_arm(axes: int) -> None:
     base = ["x", "y", "yaw"]
     names = np.array([*base, *(f"arm_{i}" for i in range(axes)), "gripper", "hinge", "handle"])
-    robot, door = names[layout.ROBOT], names[layout.DOOR]
+    robot, door = names[layout.ROBOT], names[layout.OBJECT_JOINTS]
     assert robot[layout.BASE].tolist() == base
     assert robot[layout.ARM].tolist() == [f"arm_{i}" for i in range(axes)]
     assert robot[layout.BASE_AND_ARM].size == 3 + axes
-    assert (robot[layout.GRIPPER], *door[[layout.HINGE, layout.HANDLE]]) == (
+    assert (robot[layout.GRIPPER], *door[[layout.MOVED, layout.LATCH]]) == (
         "gripper", "hinge", "handle"
     )  # fmt: skip
 
@@ -176,6 +186,8 @@ def test_columns_are_those_of_any_arm(axes: int) -> None:
 def weld_the_forearm(values: dict[str, Any]) -> None:
     """Leave six axes to the arm."""
     del values["joints"]["l_forearm_roll_joint"]
+    values["continuous"].remove("l_forearm_roll_joint")
+    values["controllers"]["arm"]["joints"].remove("l_forearm_roll_joint")
     values["planning"]["bodies"]["forearm"]["joint"] = "l_elbow_flex_joint"
 
 
@@ -184,17 +196,17 @@ def test_a_robot_with_six_axes_has_its_policy_plan_and_check(tmp_path: Path) -> 
     setup = PlanningSetup(DOOR, robot, SkillSettings.load())
     theta, gamma = DOOR.split(DOOR.prototype)
     request = PlanRequest(theta, gamma, robot.home, np.zeros(2), -0.7, OPEN_TO)
-    solutions = Prototypes.load()
+    solutions = Prototypes.load("door")
     welded = solutions.joints.index("l_forearm_roll_joint")
     path = np.delete(solutions.solutions["pull"][0].path, welded, axis=1)
-    guess = transfer(Solution(gamma, path), DOOR, request)
+    guess = transfer(Solution(gamma, path), DOOR, setup.action, request)
     world = World(setup, theta, gamma)
     policy = Policy(world, request, setup.settings.planner.coarse, pairs(world))
     assert policy.problem.nlp().getDimension() == guess.size == 20 * 12
     path = refine(guess, request.configuration, setup.settings.planner.fine)
-    plan = timed_plan(path, request, robot, setup.settings.timing)
-    assert plan.positions.shape == (201, 10)
-    np.testing.assert_allclose(plan.door[-1], [OPEN_TO, -0.7])
+    plan = timed_plan(path, request, world)
+    assert plan.positions.shape == (len(plan.times), 10)
+    np.testing.assert_allclose(plan.object_joints[-1], [OPEN_TO, -0.49], atol=1e-4)
     with pytest.raises(PlanRejected, match="gripper and handle are .* mm apart"):
         check(plan, request, world)  # its forearm is welded at another angle
 
@@ -204,7 +216,7 @@ def test_the_stem_is_that_of_the_kinematic_model() -> None:
     assert DOOR.stem is not None
     world = World(PlanningSetup.load(DOOR), np.zeros(3), gamma)
     positions = np.zeros((1, 13))
-    box = world.door_boxes()[STEM]
+    box = world.object_boxes()[STEM]
     pose = world.poses(positions, [box.frame])[0, 0]
     centre, size = DOOR.stem.cuboid(gamma)
     np.testing.assert_allclose(pose[:3, :3] @ box.centre + pose[:3, 3], centre, atol=1e-9)

@@ -17,8 +17,8 @@ from kmn_skill.planning.transfer import hermite, move_base, refine, transfer
 from kmn_skill.planning.world import World
 
 MODEL = KinematicModel.load("door")
-SETUP = PlanningSetup.load(MODEL)
-SOLUTIONS = {name: known[0].path for name, known in Prototypes.load().solutions.items()}
+SETUP, ACTION = PlanningSetup.load(MODEL), MODEL.actions[0]
+SOLUTIONS = {name: known[0].path for name, known in Prototypes.load("door").solutions.items()}
 HOME = SETUP.robot.home
 THETA = np.array([0.4, -0.6, 0.8])
 ZERO = np.zeros(3), np.zeros(4)
@@ -31,9 +31,9 @@ def request(mode: str, **changes: Any) -> PlanRequest:
         "theta": ZERO[0],
         "gamma": ZERO[1],
         "start": HOME,
-        "door_start": np.zeros(2),
-        "handle_angle": -0.7,
-        "door_angle": DOOR_ANGLES[mode],
+        "object_start": np.zeros(2),
+        "unlatched": -0.7,
+        "target": DOOR_ANGLES[mode],
     }
     return PlanRequest(**{**values, **changes})
 
@@ -60,37 +60,35 @@ def test_the_prototype_s_solution_fulfils_the_constraints(mode: str) -> None:
 @pytest.mark.parametrize("mode", DOOR_ANGLES)
 def test_moved_with_door_and_start_the_solution_has_the_same_features(mode: str) -> None:
     solution = SOLUTIONS[mode]
-    pose = MODEL.transformation.matrix(THETA)
-    start = np.array([*move_base(HOME[:3], pose), *HOME[3:]])
+    start = np.array([*move_base(HOME[:3], THETA[2], np.zeros(2), THETA[:2]), *HOME[3:]])
     moved = request(mode, theta=THETA, start=start)
     before = squared(request(mode), solution[1:])
-    after = squared(moved, transfer(Solution(ZERO[1], solution), MODEL, moved))
+    after = squared(moved, transfer(Solution(ZERO[1], solution), MODEL, ACTION, moved))
     for kind, value in before.items():
         assert after[kind] == pytest.approx(value, rel=1e-3, abs=1e-3)
 
 
 def test_the_base_moves_as_a_pose_does() -> None:
     base = np.array([1.0, 2.0, 0.3])
-    pose = MODEL.transformation.matrix(THETA)
-    expected = pose @ MODEL.transformation.matrix(base)
-    moved = move_base(base, pose)
+    expected = MODEL.transformation.matrix(THETA) @ MODEL.transformation.matrix(base)
+    moved = move_base(base, THETA[2], np.zeros(2), THETA[:2])
     assert MODEL.transformation.matrix(moved) == pytest.approx(expected)
 
 
 def test_the_transfer_begins_at_the_start_and_ends_at_the_goal() -> None:
     solution = SOLUTIONS["pull"]
-    asked = request("pull", theta=THETA, door_start=np.array([-0.2, -0.1]), door_angle=-0.6)
-    guess = transfer(Solution(ZERO[1], solution), MODEL, asked)
+    asked = request("pull", theta=THETA, object_start=np.array([-0.2, -0.1]), target=-0.6)
+    guess = transfer(Solution(ZERO[1], solution), MODEL, ACTION, asked)
     assert len(guess) == len(solution) - 1
     assert np.abs(guess[0, :11] - asked.start).max() < 0.6  # one step away
     assert guess[0, 11:] == pytest.approx([-0.2, -0.1], abs=1e-6)
-    assert guess[-1, 11:] == pytest.approx([-0.6, -0.7], abs=1e-6)
+    assert guess[-1, 11:] == pytest.approx([-0.6, -0.52], abs=1e-4)  # let up to 0.7 of its way
 
 
 def test_a_handle_at_another_place_moves_the_base_with_it() -> None:
     solution = SOLUTIONS["pull"]
     gamma = np.array([0.0, 0.1, 0.02, 0.05])
-    guess = transfer(Solution(ZERO[1], solution), MODEL, request("pull", gamma=gamma))
+    guess = transfer(Solution(ZERO[1], solution), MODEL, ACTION, request("pull", gamma=gamma))
     handle = MODEL.joints[1]
     shift = handle.origin(gamma) - handle.origin(ZERO[1])
     grasp = 2 * (len(guess) // 4)  # the door is closed
@@ -98,7 +96,7 @@ def test_a_handle_at_another_place_moves_the_base_with_it() -> None:
 
 
 def test_a_wrong_target_violates_the_equalities() -> None:
-    found = squared(request("pull", door_angle=-0.5), SOLUTIONS["pull"][1:])
+    found = squared(request("pull", target=-0.5), SOLUTIONS["pull"][1:])
     assert found[int(ry.OT.eq)] > 1.0
 
 

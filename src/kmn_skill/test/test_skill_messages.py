@@ -12,7 +12,7 @@ from kmn_skill.ros.messages import observation_from_message
 
 
 def problem(**fields: Any) -> str:
-    return observation_from_message(MorphingParameters(**fields)).problem
+    return observation_from_message(MorphingParameters(**fields), "hinge").problem
 
 
 @pytest.mark.parametrize("kind", ["", "lever"])
@@ -31,9 +31,33 @@ def test_a_mirrored_door_and_other_handles_are_refused_with_the_reason() -> None
     assert "the handle is a knob" in problem(alternative="knob")
 
 
+@pytest.mark.parametrize(
+    ("status", "kind", "mirrored", "lacks"),
+    [
+        (MorphingParameters.OK, "lever", False, False),
+        (MorphingParameters.OK, "knob", False, True),
+        (MorphingParameters.OK, "knob", True, False),
+        (MorphingParameters.HANDLE_NOT_SEEN, "", False, True),
+        (MorphingParameters.NOT_CONVERGED, "knob", False, False),
+    ],
+)
+def test_a_door_whose_handle_may_be_a_lever_from_near_lacks_its_handle_only(
+    status: int, kind: str, mirrored: bool, lacks: bool
+) -> None:
+    message = MorphingParameters(status=status, reason="so", alternative=kind, mirrored=mirrored)
+    assert observation_from_message(message, "hinge").lacks_handle == lacks
+
+
 def test_the_recess_is_read_where_it_is_told() -> None:
     names, values = ["tilt", "recess"], [0.2, 0.07]
     message = MorphingParameters(surroundings_names=names, surroundings=values)
-    assert observation_from_message(message).recess == 0.07
+    assert observation_from_message(message, "hinge").recess == 0.07
     for short in (MorphingParameters(), MorphingParameters(surroundings_names=["recess"])):
-        assert math.isnan(observation_from_message(short).recess)
+        assert math.isnan(observation_from_message(short, "hinge").recess)
+
+
+def test_the_hinge_is_read_where_its_angle_is_told() -> None:
+    message = MorphingParameters(joint_names=["handle", "hinge"], joint_positions=[-0.1, 0.3])
+    assert observation_from_message(message, "hinge").hinge == 0.3
+    for short in (MorphingParameters(), MorphingParameters(joint_names=["hinge"])):
+        assert math.isnan(observation_from_message(short, "hinge").hinge)

@@ -115,3 +115,39 @@ def test_the_first_state_of_another_world_is_not_given_as_one_of_this(watch: Sta
     with pytest.raises(StatesError, match="base_x jumped by 2.00") as raised:
         watch.newest(now(), known)
     assert raised.value.reason == "another_world"
+
+
+def test_a_joint_that_turns_on_and_on_may_be_told_within_a_turn() -> None:
+    """Past half a turn others tell it at the other end; of a joint with limits that is a jump."""
+    watch = StateWatch(SETTINGS, JOINTS, continuous=("arm",))
+    for count in range(100):
+        angle = 0.1 * count
+        told = (angle + np.pi) % (2.0 * np.pi) - np.pi
+        watch.put("joint_states", Sample(0.1 * count, np.array([0.0, told])))
+        robot = watch.robot(0.1 * count, 1.0)
+        assert robot is not None
+        np.testing.assert_allclose(robot.positions, [0.0, angle], atol=1e-9)
+    assert watch.breaks == 0
+    watch.put("joint_states", Sample(10.0, np.array([0.0, 9.9 - np.pi])))
+    watch.put("joint_states", Sample(10.1, np.array([2.0 * np.pi, 9.9])))
+    assert watch.breaks == 2
+
+
+def test_where_the_robot_is_is_known_only_from_recent_states(
+    watch: StateWatch, clock: SteadyClock
+) -> None:
+    known = watch.robot(10.1, 0.2)
+    assert known is not None
+    np.testing.assert_array_equal(known.positions, [1.0, 2.0])
+    assert watch.robot(10.3, 0.2) is None
+    clock.time = 0.3
+    assert watch.robot(10.1, 0.2) is None
+    assert StateWatch(SETTINGS, JOINTS).robot(0.0, 1.0) is None
+
+
+def test_where_nobody_tells_the_doors_angles_the_robot_is_enough() -> None:
+    watch = StateWatch(SETTINGS, {"joint_states": JOINTS["joint_states"]})
+    watch.put("joint_states", Sample(10.0, np.array([1.0, 2.0])))
+    state = watch.newest(10.1, watch.breaks)
+    assert not watch.tells_door
+    assert np.isnan([state.hinge, state.handle]).all()

@@ -13,14 +13,15 @@ from kmn_skill.planning.layout import BASE_POSITION
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import pairs
 from kmn_skill.planning.prototypes import Prototypes
+from kmn_skill.planning.robot_frames import boxes
 from kmn_skill.planning.solver import Solver
 from kmn_skill.planning.surroundings import Obstacle, wall_around
 from kmn_skill.planning.transfer import transfer
-from kmn_skill.planning.world import World, blunt, boxes
+from kmn_skill.planning.world import World, blunt
 
 MODEL = KinematicModel.load("door")
 SETUP = PlanningSetup.load(MODEL)
-EXPERIMENT, PROTOTYPES = Experiment.load(), Prototypes.load()
+EXPERIMENT, PROTOTYPES = Experiment.load(), Prototypes.load("door")
 IN_ROOM = PlanningSetup.load(EXPERIMENT.kinematic_model(in_room=True))
 GAMMA = np.array([-0.2, 0.1, 0.0, 0.0])
 SETTINGS = SETUP.settings.surroundings
@@ -50,9 +51,9 @@ def test_any_cuboid_is_an_obstacle_where_the_object_stands() -> None:
     frame = world.configuration.getFrame("crate")
     expected = MODEL.transformation.matrix(theta) @ [*crate.centre, 1.0]
     assert frame.getPosition() == pytest.approx(expected[:3])
-    collisions = SETUP.settings.policy.obstacle_collisions
+    collisions = SETUP.robot.planning.collisions.obstacles
     kept = {pair.first for pair in pairs(world) if pair.second == "crate"}
-    assert kept == {*collisions, *map(blunt, SETUP.settings.policy.blunt_collisions)}
+    assert kept == {*collisions, *map(blunt, SETUP.robot.planning.collisions.blunt)}
     assert set(collisions) <= set(SETUP.robot.planning.bodies)
     # The base a hand's breadth beside the crate.
     yaw, place = theta[2], expected[:2]
@@ -86,10 +87,12 @@ def test_the_deeper_the_base_is_in_a_wall_the_more_it_violates_the_policy(yaw: f
 
 @pytest.mark.parametrize("seed", [0, 2, 4, 6])
 def test_a_guess_that_leads_into_the_wall_is_led_out(seed: int) -> None:
-    values = EXPERIMENT.random_doors(in_room=True, count=1, seed=seed)[0]
+    values = EXPERIMENT.random_objects(IN_ROOM.model, True, 1, seed)[0]
     recess = random_recesses("push", 1, seed)[0]
     request = EXPERIMENT.request(IN_ROOM, values, "push", recess)
-    guess = transfer(next(PROTOTYPES.guesses(request, 1, 0.0)).solution, IN_ROOM.model, request)
+    guess = transfer(
+        next(PROTOTYPES.guesses(request, 1, 0.0)).solution, IN_ROOM.model, IN_ROOM.action, request
+    )
     to_the_right = -IN_ROOM.model.transformation.matrix(request.theta)[:2, 1]
     opening = guess[-IN_ROOM.settings.planner.coarse :]
     opening[:, BASE_POSITION] += np.linspace(0.02, 0.1, len(opening))[:, None] * to_the_right
@@ -110,4 +113,4 @@ def _nearest(world: World, path: NDArray[np.float64]) -> float:
 
 
 def _wall(recess: float) -> tuple[Obstacle, ...]:
-    return wall_around(MODEL, GAMMA, recess, SETTINGS)
+    return wall_around(MODEL.body("panel"), GAMMA, recess, SETTINGS)

@@ -8,9 +8,9 @@ import robotic as ry
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.planning.clearance import Box, Surface, box_distance, clearance, sample_surface
-from kmn_skill.planning.kinematics import moved_cubes
 from kmn_skill.planning.planning_setup import PlanningSetup
-from kmn_skill.planning.world import PADS, TOOL, World, boxes, door_body, surfaces
+from kmn_skill.planning.robot_frames import boxes, surfaces
+from kmn_skill.planning.world import PADS, TOOL, World, object_body
 
 VALUES = np.array([0.3, -0.5, 0.7, -0.2, 0.15, 0.02, -0.06])
 
@@ -50,11 +50,14 @@ def test_the_robot_moves_as_in_the_full_model(world: World, seed: int) -> None:
 def test_the_door_moves_as_the_kinematic_model(
     world: World, model: KinematicModel, angles: tuple[float, float]
 ) -> None:
-    frames = [door_body(body.name) for body in model.bodies]
+    frames = [object_body(body.name) for body in model.bodies]
     poses = world.poses(np.array([[*np.zeros(11), *angles]]), frames)[0]
     gamma = model.split(VALUES)[1]
     for pose, cube, body in zip(
-        poses, moved_cubes(model, VALUES, angles), model.bodies, strict=True
+        poses,
+        model.moved_cubes(VALUES, dict(zip(("hinge", "handle"), angles, strict=True))),
+        model.bodies,
+        strict=True,
     ):
         assert pose[:3, :3] * body.size(gamma) == pytest.approx(cube[:3, :3], abs=1e-9)
         assert pose[:3, 3] == pytest.approx(cube[:3, 3], abs=1e-9)

@@ -2,6 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Reason = Literal[
+    # interrupted
+    "cancelled", "preempted", "node_ended",
+    # the goal, or its plan
+    "bad_goal", "no_plan",
+    # the door
+    "none", "few_frames", "stale", "future", "model", "status", "frame", "names", "not_finite",
+    "out_of_limits", "handle_not_seen", "disagreement", "covariance", "uncertain",
+    # states of robot and door, controllers
+    "no_states", "states_stopped", "stale_states", "another_world", "controller",
+    # the motion
+    "tracking", "slipped", "missed_handle", "missed",
+    # a fault of the program
+    "internal_error",
+]  # fmt: skip
+
 
 class SkillError(Exception):
     """A goal cannot be reached; the text says why.
@@ -12,9 +33,9 @@ class SkillError(Exception):
         Short key to count it by, e.g. ``slipped``.
     """
 
-    def __init__(self, reason: str, text: str) -> None:
+    def __init__(self, reason: Reason, text: str) -> None:
         super().__init__(text)
-        self.reason = reason
+        self.reason: Reason = reason
 
 
 class GoalError(SkillError):
@@ -31,6 +52,24 @@ class StatesError(SkillError):
 
 class ExecutionError(SkillError):
     """Robot or door do not follow the plan; another attempt may help."""
+
+
+class BlockedHandError(ExecutionError):
+    """The hand stood before it had closed about the handle.
+
+    Attributes
+    ----------
+    offset
+        (3,) from where the handle was believed to where it must be, metres, world frame.
+    """
+
+    def __init__(self, text: str, offset: NDArray[np.float64]) -> None:
+        super().__init__("missed_handle", text)
+        self.offset = offset
+
+
+class ControllerError(SkillError):
+    """A controller of the robot does not do what it was sent."""
 
 
 class InterruptedGoal(SkillError):  # noqa: N818

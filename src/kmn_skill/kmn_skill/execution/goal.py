@@ -1,24 +1,34 @@
-"""A goal to open a door, how it ended, and those with whom it has to do."""
+"""A goal to open an object, how it ended, and those with whom it has to do."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Final, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.execution.errors import InterruptedGoal
+from kmn_skill.execution.errors import InterruptedGoal, Reason
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.planning.plan import Plan, PlanReport
 
-SUCCESS = "success"  # outcome of a goal that was reached
+SUCCESS: Final = "success"  # outcome of a goal that was reached
+Outcome = Reason | Literal["success"]
 
 
 class Goal(NamedTuple):
-    """Angles (rad) to which to press the handle and to open the door."""
+    """What is to be done.
 
-    handle_angle: float
-    door_angle: float
+    Attributes
+    ----------
+    unlatched, target
+        Positions (m or rad) to which to move what unlatches the object, and then the object.
+    object_id
+        Number of the object, as its parameters have it; 0: whichever is seen.
+    """
+
+    unlatched: float
+    target: float
+    object_id: int = 0
 
 
 class Result(NamedTuple):
@@ -30,8 +40,9 @@ class Result(NamedTuple):
         `SUCCESS`, or a short key of what went wrong.
     reason
         Why not, for people to read; empty on success.
-    handle_angle, door_angle
-        Largest handle angle reached, and the door angle in the end, radians.
+    unlatched, opened
+        Furthest position of what unlatches the object, and where the object is in the end, m or
+        rad.
     report
         What the check of the last plan found, if there was one.
     attempts
@@ -40,22 +51,30 @@ class Result(NamedTuple):
         Largest one, in units of the tolerances.
     """
 
-    outcome: str
+    outcome: Outcome
     reason: str
-    handle_angle: float = np.nan
-    door_angle: float = np.nan
+    unlatched: float = np.nan
+    opened: float = np.nan
     report: PlanReport | None = None
     attempts: int = 0
     tracking_error: float = np.nan
 
 
 class Feedback(NamedTuple):
-    """What is being done: phase, part of it all that is done (0 to 1), and the door's angles."""
+    """What is being done.
+
+    Attributes
+    ----------
+    phase, progress
+        Its name, and the part of it all that is done, 0 to 1.
+    unlatched, opened
+        Present positions of what unlatches the object, and of the object, m or rad.
+    """
 
     phase: str
     progress: float
-    handle_angle: float
-    door_angle: float
+    unlatched: float
+    opened: float
 
 
 class Commands(Protocol):
@@ -70,8 +89,17 @@ class Commands(Protocol):
     def send(self, part: Part) -> None:
         """Send a part of the plan."""
 
-    def hold(self) -> None:
-        """Let the robot hold where it is."""
+    def are_through(self) -> bool:
+        """Tell whether all controllers are through with what was sent, as far as they tell.
+
+        Raises
+        ------
+        ControllerError
+            If one of them failed.
+        """
+
+    def hold(self, positions: NDArray[np.float64]) -> None:
+        """Let the robot hold at positions (J,) of its joints, where it is, m and rad."""
 
     def tell(self, text: str) -> None:
         """Tell people what happened."""

@@ -4,85 +4,38 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.model.parts import Joint
-from kmn_skill.execution.door_memory import DoorMemory
+from kmn_skill.execution.door_observation import when_closed
 from kmn_skill.execution.errors import (
+    BlockedHandError,
     DoorError,
     ExecutionError,
-    GoalError,
     SkillError,
     StatesError,
 )
-from kmn_skill.execution.goal import SUCCESS, Client, Commands, Feedback, Goal, Result
-from kmn_skill.execution.perceived_door import PerceivedDoor, when_closed
-from kmn_skill.execution.plan_execution import Execution, ExecutionSettings
-from kmn_skill.execution.states import StateWatch, WorldState
-from kmn_skill.planning.layout import HANDLE, HINGE
+from kmn_skill.execution.following import RobotFollowing
+from kmn_skill.execution.goal import SUCCESS, Client, Commands, Goal, Outcome, Result
+from kmn_skill.execution.goal_check import check_goal, check_reached
+from kmn_skill.execution.grasp_quantities import hinge_distance, swung, with_handle_moved
+from kmn_skill.execution.held_door import MISSED_HANDLE
+from kmn_skill.execution.knowledge import Knowledge
+from kmn_skill.execution.opening_settings import OpeningSettings
+from kmn_skill.execution.plan_execution import ExecutionSettings
+from kmn_skill.execution.states import WorldState
+from kmn_skill.planning.look import before_door
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
-from kmn_skill.planning.surroundings import WALL, Obstacle, SurroundingsSettings, wall_around
+from kmn_skill.planning.surroundings import WALL, Obstacle, wall_around
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
+ELSEWHERE = ("slipped", "missed", MISSED_HANDLE)  # reasons why the door may not be where it was
+FROM_NEAR, FROM_AFAR = "from near", "from afar"  # whence a goal has looked at the door
 # Why a door that the robot hides from the camera is not to be relied on.
 HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
-
-
-@dataclass(frozen=True)
-class OpeningSettings:
-    """How long and how often it is tried, and what counts as reached.
-
-    Attributes
-    ----------
-    door_timeout
-        Seconds that a goal waits for parameters to rely on.
-    retries
-        Further attempts after the robot or the door did not follow.
-    handle_tolerance, door_tolerance
-        By which the angles (rad) may miss the goal.
-    hidden_distance
-        Metres after which the robot hides the door; then where it was before is relied upon.
-    surroundings, recess
-        Whether a ``wall`` stands around the door, and how deep (m) the panel's front lies in it
-        where perception does not tell.
-    """
-
-    door_timeout: float
-    retries: int
-    handle_tolerance: float
-    door_tolerance: float
-    hidden_distance: float
-    surroundings: str
-    recess: float
-
-
-class Knowledge(NamedTuple):
-    """What is known of the world, and kept from goal to goal.
-
-    Attributes
-    ----------
-    model
-        Kinematic model of the door.
-    door, memory
-        The door as it is seen, and as it was seen before the robot hid it.
-    watch
-        Of the states of robot and door.
-    wall
-        Around the door, where there is one.
-    """
-
-    model: KinematicModel
-    door: PerceivedDoor
-    memory: DoorMemory
-    watch: StateWatch
-    wall: SurroundingsSettings
 
 
 class DoorOpening:
@@ -109,113 +62,227 @@ class DoorOpening:
         settings: OpeningSettings,
         execution: ExecutionSettings,
     ) -> None:
-        self._model, self._door, self._memory, self._watch, self._wall = knowledge
+        self._model, self._door, self._memory, self._watch, self._held, self._wall = knowledge
+        self._action = self._model.actions[0]
         self._planner, self._commands, self._client = planner, commands, client
-        self._settings, self._execution = settings, execution
-        self._breaks = self._watch.breaks
-        self._handle = self._hinge = math.nan
+        self._settings = settings
+        self._robot = RobotFollowing(knowledge, commands, client, execution)
         self._plan_report: PlanReport | None = None
         self._attempts = 0
-        self._tracking_error = 0.0
 
     def run(self, goal: Goal) -> Result:
         """Open the door; in the end the robot stands still, whatever happened."""
         try:
-            self._check(goal)
+            check_goal(goal, self._action, self._settings.door_tolerance)
             self._open(goal)
-            self._memory.interrupted = False
+            self._memory.reach_goal()
         except SkillError as error:
-            self._commands.hold()
+            self._robot.hold()
             return self._result(error.reason, str(error))
         except Exception:
-            self._commands.hold()
+            self._robot.hold()
             raise
         return self._result(SUCCESS, "")
 
-    def _result(self, outcome: str, reason: str) -> Result:
+    def _result(self, outcome: Outcome, reason: str) -> Result:
+        robot, plan = self._robot, self._plan_report
         return Result(
-            outcome,
-            reason,
-            self._handle,
-            self._hinge,
-            self._plan_report,
-            self._attempts,
-            self._tracking_error,
+            outcome, reason, robot.handle, robot.hinge, plan, self._attempts, robot.tracking_error
         )
-
-    def _check(self, goal: Goal) -> None:
-        """Raise if the door's joints cannot have the goal's angles."""
-        joints = self._model.joints
-        _check_angle("handle_angle", goal.handle_angle, joints[HANDLE])
-        _check_angle("door_angle", goal.door_angle, joints[HINGE])
-        if abs(goal.door_angle) <= self._settings.door_tolerance:
-            raise GoalError(
-                "bad_goal",
-                f"door_angle = {goal.door_angle:g} does not open the door, expected more than "
-                f"the tolerance {self._settings.door_tolerance:g} rad to either side",
-            )
 
     def _open(self, goal: Goal) -> None:
         """Plan and follow, with some retries; raise if the last one fails."""
-        values = self._wait_for_door()
-        for retries_left in reversed(range(self._settings.retries + 1)):
+        settings = self._settings
+        values, is_elsewhere, setback = self._wait_for_door(), False, ""
+        for retries_left in reversed(range(settings.retries + 1)):
             try:
-                self._follow(self._plan(values, goal))
-                self._check_reached(goal)
+                if is_elsewhere and self._planner.drives:
+                    self._look_again(values)
+                    self._memory.forget()
+                    values = self._wait_for_door(values)
+                self._robot.follow(self._plan(values, goal))
+                reached = Goal(self._robot.handle, self._robot.hinge)
+                tolerances = settings.handle_tolerance, settings.door_tolerance
+                check_reached(reached, goal, self._action, tolerances)
                 return
             except ExecutionError as error:
-                self._commands.hold()
+                self._robot.hold()
                 if not retries_left:
                     raise
-                self._commands.tell(f"{error}; trying again from here")
+                if isinstance(error, BlockedHandError):
+                    values, is_elsewhere = self._felt(values, error.offset), False
+                    self._commands.tell(f"{error}; trying again where the fingers found it")
+                    continue
+                is_elsewhere |= self._carries_camera or error.reason in ELSEWHERE
+                again, setback = "looking" if is_elsewhere else "trying", str(error)
+                self._commands.tell(f"{error}; {again} again from here")
+            except DoorError as error:
+                raise DoorError(error.reason, f"{error}; before, {setback}") from error
 
-    def _wait_for_door(self) -> NDArray[np.float64]:
-        """Return the parameters (n + m,) of the door when closed."""
+    def _felt(
+        self, values: NDArray[np.float64], offset: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return parameters (n + m,) by which the handle is elsewhere by an offset (3,)."""
+        felt = with_handle_moved(self._model, values, self._door.covariance, offset)
+        self._held.see(felt, self._robot.state().hinge)
+        return felt
+
+    @property
+    def _carries_camera(self) -> bool:
+        """Whether the robot sees the door better from elsewhere."""
+        return self._settings.look_distance > 0.0
+
+    @property
+    def _view_distance(self) -> float:
+        """Metres from the door at which the robot does not hide it."""
+        return self._settings.look_distance or self._settings.retreat_distance
+
+    def _wait_for_door(self, closed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Return the parameters (n + m,) of the door when closed; move to see it if need be.
+
+        Parameters
+        ----------
+        closed
+            (n + m,) of the closed door, if this goal knew it before.
+        """
         deadline = time.monotonic() + self._settings.door_timeout
+        looked = set() if self._carries_camera else {FROM_NEAR}
+        if not self._planner.drives:
+            looked = {FROM_AFAR, FROM_NEAR}  # in vain
         while True:
-            self._breaks = self._watch.breaks  # until now the world may have changed
+            self._robot.begin()  # until now the world may have changed
             try:
-                state = self._state()
-                self._report(PhaseName.WAIT, 0.0, state)
-                return self._door_from(state)
-            except (StatesError, DoorError):
+                state = self._robot.state()
+                self._robot.report(PhaseName.WAIT, 0.0, state)
+                self._remember(state)
+                if not self._move_to_see(state, looked):
+                    return self._door_from(state, closed)
+                deadline = time.monotonic() + self._settings.door_timeout
+            except (StatesError, DoorError, ExecutionError):
                 if time.monotonic() > deadline:
                     raise
             time.sleep(POLL_PERIOD)
 
-    def _door_from(self, state: WorldState) -> NDArray[np.float64]:
+    def _remember(self, state: WorldState) -> None:
+        """Take over what was known of a door that the hand holds, before the program began anew."""
+        before = self._memory.kept
+        shape = len(self._model.parameters), state.robot.size
+        self._memory.restore(self._commands.now(), self._settings.memory_age, shape)
+        kept = self._memory.kept
+        if kept is before or kept is None:
+            return
+        if kept.grip is None:
+            self._held.see(kept.values, 0.0)
+        else:
+            self._held.resume(kept.values, kept.grip, state.robot)
+
+    def _move_to_see(self, state: WorldState, looked: set[str]) -> bool:
+        """Move once to see the door, or its handle, from elsewhere; tell whether it was needed."""
+        now = self._commands.now()
+        roughly = self._door.roughly(now)
+        if FROM_AFAR not in looked and self._memory.kept is None and roughly is not None:
+            looked.add(FROM_AFAR)
+            if self._is_at(roughly, state):
+                self._commands.tell("the robot is at the door and may hide it; drawing back")
+                self._look(roughly, self._before(roughly))
+                return True
+        seen, why = self._door.without_handle(now), "no handle to grasp is seen from here"
+        if seen is None and self._settings.look_first:
+            seen, why = roughly, "the door was seen from afar"
+        if FROM_NEAR not in looked and seen is not None:
+            looked.add(FROM_NEAR)
+            self._commands.tell(f"{why}; looking from near")
+            self._look(seen, self._before(seen))
+            return True
+        return False
+
+    def _is_at(self, values: NDArray[np.float64], state: WorldState) -> bool:
+        """Tell whether the robot is at a door of parameters (n + m,)."""
+        try:
+            reach = self._planner.reach(values, state.robot)
+        except PlanningFailed as error:
+            raise SkillError("no_plan", str(error)) from error
+        return reach > -self._settings.look_clearance
+
+    def _look_again(self, values: NDArray[np.float64]) -> None:
+        """Draw back from a door of parameters (n + m,) to where it was seen from, or before it."""
+        kept = self._memory.kept
+        if kept is None or self._carries_camera:
+            self._look(values, self._before(values))
+        else:
+            self._look(values, kept.robot)
+
+    def _before(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where (J,) the robot stands before a door of parameters (n + m,) to see it."""
+        robot = self._robot.state().robot
+        return before_door(self._model, values, robot, self._view_distance)
+
+    def _look(self, values: NDArray[np.float64], place: NDArray[np.float64]) -> None:
+        """Drive to positions (J,) from where a door of parameters (n + m,) can be seen."""
+        start = self._robot.state().robot
+        try:
+            plan = self._planner.look(values, start, place, self._settings.look_clearance)
+        except PlanningFailed as error:
+            raise SkillError("no_plan", str(error)) from error
+        self._robot.follow(plan)
+        self._door.forget(self._commands.now())  # what it hid on the way
+
+    def _door_from(
+        self, state: WorldState, closed: NDArray[np.float64] | None
+    ) -> NDArray[np.float64]:
         """Return the parameters (n + m,) of the closed door, as seen before the robot hid it."""
-        before = self._memory.recall(state.robot, self._settings.hidden_distance)
+        hidden = math.inf if self._carries_camera else self._settings.hidden_distance
+        before = self._memory.recall(state.robot, hidden)
         try:
             seen = self._door.values(self._commands.now())
+            if before is not None and self._is_another(seen, before.values):
+                before = None
         except DoorError as error:
-            if before is None or not self._memory.interrupted or error.reason not in HIDDEN:
+            if before is None or not before.interrupted or error.reason not in HIDDEN:
                 raise
         if before is not None:
             self._commands.tell("relying on where the door was before the robot drove up to it")
-            return before
-        values = when_closed(self._model, seen, state.hinge)
-        self._memory.keep(values, state.robot)
+            return before.values
+        values, hinge = seen, self._door.hinge
+        if not math.isfinite(hinge):  # as it stands
+            hinge = self._hinge_of(seen, state, closed)
+            values = when_closed(self._model, seen, hinge)
+        self._memory.keep(values, state.robot, state.time)
+        self._held.see(values, hinge)
         return values
 
+    def _hinge_of(
+        self, seen: NDArray[np.float64], state: WorldState, closed: NDArray[np.float64] | None
+    ) -> float:
+        """Return the hinge angle (rad) of a door as it is seen; one not known before is closed."""
+        if self._watch.tells_door:
+            return state.hinge
+        if closed is None or self._is_another(seen, closed):
+            return 0.0
+        return swung(self._model, closed, seen)
+
+    def _is_another(self, seen: NDArray[np.float64], before: NDArray[np.float64]) -> bool:
+        """Tell whether parameters (n + m,) are of another door: hinges stay where they are."""
+        return hinge_distance(self._model, seen, before) > self._settings.door_distance
+
     def _plan(self, values: NDArray[np.float64], goal: Goal) -> Plan:
-        state = self._state()
-        self._report(PhaseName.PLAN, 0.0, state)
+        state = self._robot.state()
+        self._robot.report(PhaseName.PLAN, 0.0, state)
         self._attempts += 1
         theta, gamma = self._model.split(values)
         request = PlanRequest(
             theta=theta,
             gamma=gamma,
             start=state.robot,
-            door_start=np.array([state.hinge, state.handle]),
-            handle_angle=goal.handle_angle,
-            door_angle=goal.door_angle,
+            object_start=np.array([state.hinge, state.handle]),
+            unlatched=goal.unlatched,
+            target=goal.target,
             obstacles=self._obstacles(gamma),
         )
         try:
             plan = self._planner.plan(request, lambda: self._client.interruption() is not None)
         except PlanningCancelled:
-            self._go_on()
+            self._robot.go_on()
             raise
         except PlanningFailed as error:
             raise SkillError("no_plan", f"there is no plan: {error}") from error
@@ -229,56 +296,4 @@ class DoorOpening:
             return ()
         seen = self._door.recess
         recess = seen if math.isfinite(seen) else self._settings.recess
-        return wall_around(self._model, gamma, recess, self._wall)
-
-    def _follow(self, plan: Plan) -> None:
-        """Send a plan part by part until all is done and at rest."""
-        execution = Execution(plan, self._commands.now(), self._execution)
-        finished = False
-        while not finished:
-            state = self._state()
-            part, phase, progress, finished = execution.step(self._commands.now(), state)
-            self._tracking_error = max(self._tracking_error, execution.tracking_error)
-            if part is not None:
-                self._commands.send(part)
-            self._report(phase, progress, state)
-            self._watch.wait(POLL_PERIOD)
-
-    def _state(self) -> WorldState:
-        """Return the newest state; raise if the goal ends or the world is another one."""
-        self._go_on()
-        state = self._watch.newest(self._commands.now(), self._breaks)
-        self._hinge = state.hinge
-        if not abs(state.handle) <= abs(self._handle):
-            self._handle = state.handle
-        return state
-
-    def _go_on(self) -> None:
-        """Raise if the goal is not wanted any more."""
-        if interruption := self._client.interruption():
-            raise interruption
-
-    def _report(self, phase: str, progress: float, state: WorldState) -> None:
-        self._client.feed_back(Feedback(phase, progress, state.handle, state.hinge))
-
-    def _check_reached(self, goal: Goal) -> None:
-        """Raise if handle or door are not where the goal has them."""
-        settings = self._settings
-        for what, reached, wanted, tolerance in (
-            ("handle", self._handle, goal.handle_angle, settings.handle_tolerance),
-            ("door", self._hinge, goal.door_angle, settings.door_tolerance),
-        ):
-            if math.copysign(1.0, wanted) * reached < abs(wanted) - tolerance:
-                raise ExecutionError(
-                    "missed", f"the {what} came to {reached:.2f} rad, expected {wanted:.2f} rad"
-                )
-
-
-def _check_angle(name: str, angle: float, joint: Joint) -> None:
-    low, high = joint.limits
-    if not low <= angle <= high:
-        raise GoalError(
-            "bad_goal",
-            f"{name} = {angle:g} is beyond the joint '{joint.name}', "
-            f"expected [{low:g}, {high:g}] rad",
-        )
+        return wall_around(self._model.body(self._action.joint.body), gamma, recess, self._wall)

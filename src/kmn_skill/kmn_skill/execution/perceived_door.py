@@ -6,17 +6,17 @@ import math
 import threading
 from collections import deque
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.errors import DoorError
-from kmn_skill.execution.grasp_uncertainty import YAW, grasp_deviations, grasp_quantities
-from kmn_skill.planning.kinematics import turn
-from kmn_skill.planning.layout import HINGE
+from kmn_skill.execution.grasp_quantities import YAW, grasp_deviations, grasp_quantities
 
+HANDLE_NOT_SEEN: Final = "handle_not_seen"  # reason for which a door is not usable
 MAX_FRAMES = 100  # that are kept
 
 
@@ -51,55 +51,6 @@ class AcceptanceSettings:
     limit_margin: float
 
 
-class DoorObservation(NamedTuple):
-    """Morphing parameters as they came.
-
-    Attributes
-    ----------
-    time
-        Of the exposure, seconds.
-    model, frame
-        Names of the kinematic model and of the frame that the door is given in.
-    names
-        Names of theta and gamma.
-    values
-        (n + m,) theta and gamma [m, rad, 1].
-    covariance
-        (n + m, n + m) of the values; NaN where unknown.
-    problem
-        Why they are not valid; empty if they are.
-    recess
-        Of the panel's front behind the wall's face, metres; NaN where unknown.
-    """
-
-    time: float
-    model: str
-    frame: str
-    names: tuple[str, ...]
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    problem: str
-    recess: float = math.nan
-
-
-def when_closed(
-    model: KinematicModel, values: NDArray[np.float64], hinge_angle: float
-) -> NDArray[np.float64]:
-    """Return the parameters (n + m,) of the same door when closed.
-
-    Parameters
-    ----------
-    values
-        (n + m,) parameters as seen; perception takes every door for a closed one.
-    hinge_angle
-        By which it was open, radians.
-    """
-    theta, gamma = model.split(values)
-    shut = model.transformation.matrix(theta) @ turn(model.joints[HINGE], gamma, -hinge_angle)
-    closed = model.transformation.read_back(shut)
-    return np.concatenate([closed, gamma])
-
-
 class PerceivedDoor:
     """Keeps the newest observations of a door; thread-safe.
 
@@ -114,17 +65,23 @@ class PerceivedDoor:
     ----------
     settings
         May be replaced.
-    recess
-        Of the last usable observation that told it, metres; else NaN.
+    recess, hinge
+        Of the last usable observation that told them, metres and radians; else NaN.
+    covariance
+        (n + m, n + m) of the parameters that were last relied upon; NaN where unknown.
     """
 
     def __init__(self, model: KinematicModel, frame: str, settings: AcceptanceSettings) -> None:
         self._model, self._frame, self.settings = model, frame, settings
         self._lock = threading.Lock()
+        self._unseen: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)  # the last, without handle
         self._kept: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)
         self._refused: DoorError | None = None  # the last one
+        self._chosen = 0
         self._since = -math.inf  # seconds; what was seen before was another world
-        self.recess = math.nan
+        self.recess = self.hinge = math.nan
+        count = len(model.parameters)
+        self.covariance: NDArray[np.float64] = np.full((count, count), math.nan)
 
     def add(self, observation: DoorObservation) -> None:
         """Keep an observation; one that is not usable separates those before from those after.
@@ -135,12 +92,19 @@ class PerceivedDoor:
             If it is not usable.
         """
         with self._lock:
+            if self._chosen not in (0, observation.number):
+                return
             try:
                 self._check(observation)
             except DoorError as refused:
                 self._kept.clear()
+                if refused.reason == HANDLE_NOT_SEEN:
+                    self._unseen.append(observation)
+                else:
+                    self._unseen.clear()
                 self._refused = refused
                 raise
+            self._unseen.clear()
             if observation.time < self._since:
                 return  # came late, of another world
             if self._kept and observation.time == self._kept[-1].time:
@@ -150,14 +114,28 @@ class PerceivedDoor:
             self._kept.append(observation)
             if math.isfinite(observation.recess):
                 self.recess = observation.recess
+            if math.isfinite(observation.hinge):
+                self.hinge = observation.hinge
+
+    def choose(self, number: int) -> bool:
+        """Rely on the object of a number only, 0: on whichever is seen; tell if it is another."""
+        with self._lock:
+            is_another = number not in (0, self._chosen)
+            if is_another:
+                self._kept.clear()
+                self._unseen.clear()
+                self._refused = None
+            self._chosen = number
+            return is_another
 
     def forget(self, now: float) -> None:
         """Forget all observations from before a time (s), as of another world."""
         with self._lock:
             self._kept.clear()
+            self._unseen.clear()
             self._refused = None
             self._since = now
-            self.recess = math.nan
+            self.recess = self.hinge = math.nan
 
     def values(self, now: float) -> NDArray[np.float64]:
         """Return the mean parameters (n + m,) of the frames that agree.
@@ -195,8 +173,41 @@ class PerceivedDoor:
                 f"expected at most {settings.max_distance:g} m and {settings.max_angle:g} rad",
             )
         values: NDArray[np.float64] = np.mean([each.values for each in kept], axis=0)
-        self._check_certainty(values, np.mean([each.covariance for each in kept], axis=0))
+        covariance = np.mean([each.covariance for each in kept], axis=0)
+        self._check_certainty(values, covariance)
+        self.covariance = covariance
         return values
+
+    def without_handle(self, now: float) -> NDArray[np.float64] | None:
+        """Return the parameters (n + m,) of a door whose handle alone was not seen, if it is so.
+
+        They are the medians of as many frames in a row as a door must be seen in.
+
+        Parameters
+        ----------
+        now
+            Present time on the clock of the observations, seconds.
+        """
+        count = self.settings.min_consistent_frames
+        with self._lock:
+            unseen = list(self._unseen)[-count:]
+        if len(unseen) < count or abs(now - unseen[-1].time) > self.settings.max_age:
+            return None
+        values: NDArray[np.float64] = np.median([each.values for each in unseen], axis=0)
+        return values
+
+    def roughly(self, now: float) -> NDArray[np.float64] | None:
+        """Return the parameters (n + m,) of a door that may be hidden in part, if there is one.
+
+        Parameters
+        ----------
+        now
+            Present time on the clock of the observations, seconds.
+        """
+        try:
+            return self.values(now)
+        except DoorError:
+            return self.without_handle(now)
 
     def _check(self, observation: DoorObservation) -> None:
         """Raise if an observation is not usable at all."""
@@ -206,7 +217,7 @@ class PerceivedDoor:
             raise DoorError(
                 "model", f"parameters are of model '{observation.model}', expected '{model.name}'"
             )
-        if observation.problem:
+        if observation.problem and not observation.lacks_handle:
             raise DoorError("status", observation.problem)
         if observation.frame != self._frame:
             raise DoorError(
@@ -232,6 +243,8 @@ class PerceivedDoor:
                     "out_of_limits",
                     f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]",
                 )
+        if observation.lacks_handle:
+            raise DoorError(HANDLE_NOT_SEEN, observation.problem)
 
     def _check_certainty(
         self, values: NDArray[np.float64], covariance: NDArray[np.float64]

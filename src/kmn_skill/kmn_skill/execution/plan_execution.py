@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import ExecutionError
 from kmn_skill.execution.states import WorldState
-from kmn_skill.planning.layout import BASE_POSITION, GRIPPER, HANDLE, HINGE
+from kmn_skill.planning.layout import BASE_POSITION, GRIPPER, LATCH, MOVED
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan
 
-MIN_STEP = 1e-3  # seconds between the start of a part and its first point
 SEND_AHEAD = 0.5  # part of its duration; a part is sent so early, while the former one runs
 
 
@@ -27,19 +26,22 @@ class ExecutionSettings:
     start_delay
         Seconds between sending the first part and its start.
     part_duration, part_overlap
-        Seconds of the plan that a part covers, and by which it reaches into the next one: if that
-        never comes, the robot stops there.
+        Seconds of the plan that a part adds, and by which it reaches into the next one: if that
+        never comes, the robot stops there. Infinite: the plan is one part.
+    hold_duration
+        Seconds in which a robot that is to hold comes to rest.
     settle_time
         Seconds after the end until robot and door count as at rest.
     position_tolerance, angle_tolerance
         Largest tracking errors of the base's position (m) and of the other joints (rad).
     handle_slip, door_slip
-        By which handle and door may stay behind the hand, radians.
+        By which what unlatches the object, and the object, may stay behind the hand, m or rad.
     """
 
     start_delay: float
     part_duration: float
     part_overlap: float
+    hold_duration: float
     settle_time: float
     position_tolerance: float
     angle_tolerance: float
@@ -50,12 +52,15 @@ class ExecutionSettings:
 class Part(NamedTuple):
     """A part of a plan, ready to be sent.
 
+    It begins with the last point that the robot has passed, so that it holds all that is left of
+    the part before, which a controller forgets at once.
+
     Attributes
     ----------
     start
-        Time at which it starts, seconds.
+        Time at which the plan starts, seconds.
     times
-        (P,) seconds since then, above 0 and increasing.
+        (P,) seconds since then, increasing.
     positions, velocities
         (P, J) of all joints [m, rad] and per second; at rest in the end.
     """
@@ -65,6 +70,12 @@ class Part(NamedTuple):
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
 
+    def of(self, columns: list[int]) -> Part:
+        """Return the part of some of the joints."""
+        return self._replace(
+            positions=self.positions[:, columns], velocities=self.velocities[:, columns]
+        )
+
 
 class Step(NamedTuple):
     """What follows from a state of the world.
@@ -73,8 +84,6 @@ class Step(NamedTuple):
     ----------
     part
         To be sent now, if any.
-    phase
-        Name of the plan's present phase.
     progress
         Part of the plan's time that has passed, 0 to 1.
     finished
@@ -82,7 +91,6 @@ class Step(NamedTuple):
     """
 
     part: Part | None
-    phase: str
     progress: float
     finished: bool
 
@@ -117,35 +125,51 @@ class Execution:
         ExecutionError
             If the robot is not where it should be, or the grasp slipped.
         """
-        elapsed = float(np.clip(state.time - self._start, 0.0, self._duration))
+        elapsed = self._elapsed(state.time)
+        self._check_tracking(elapsed, state)
+        self._check_grasp(state)
+        finished = state.time > self._start + self._duration + self._settings.settle_time
+        return Step(self._due_part(now, elapsed), elapsed / self._duration, finished)
+
+    def planned(self, time: float) -> tuple[str, NDArray[np.float64]]:
+        """Return the plan's phase at a time, and the angles (2,) that it then has the door at."""
+        elapsed = self._elapsed(time)
         point = int(np.searchsorted(self._plan.times, elapsed))
         phase = next(
             (phase.name for phase in self._plan.phases if point <= phase.last),
             self._plan.phases[-1].name,
         )
-        self._check_tracking(elapsed, state)
-        self._check_grasp(elapsed, phase, state)
-        finished = state.time > self._start + self._duration + self._settings.settle_time
-        return Step(self._due_part(now), phase, elapsed / self._duration, finished)
+        return phase, sample(self._plan.times, self._plan.object_joints, elapsed)
 
-    def _due_part(self, now: float) -> Part | None:
-        """Return the next part if it is time to send it."""
-        duration, begin = self._settings.part_duration, self._sent
-        if begin >= self._duration or (
-            begin > 0.0 and now < self._start + begin - SEND_AHEAD * duration
-        ):
+    def _elapsed(self, time: float) -> float:
+        """Return the seconds of the plan that have passed at a time."""
+        return float(np.clip(time - self._start, 0.0, self._duration))
+
+    def position(self, now: float) -> NDArray[np.float64]:
+        """Return where the parts that were sent have the robot at a time (J,), m and rad."""
+        elapsed = min(now - self._start, self._sent + self._settings.part_overlap)
+        return sample(self._plan.times, self._plan.positions, elapsed)
+
+    def _due_part(self, now: float, elapsed: float) -> Part | None:
+        """Return the next part if it is time to send it.
+
+        Parameters
+        ----------
+        elapsed
+            Seconds of the plan that the robot has passed.
+        """
+        duration, overlap = self._settings.part_duration, self._settings.part_overlap
+        begin, due = self._sent, self._start + self._sent - SEND_AHEAD * duration
+        if begin > 0.0 and (begin + overlap >= self._duration or now < due):
             return None
-        self._sent = begin + duration
+        self._sent = max(begin, now - self._start) + duration
         times = self._plan.times
-        # After the first point: that is where the robot is when the part starts.
-        first = int(np.searchsorted(times, begin + MIN_STEP))
-        last = int(np.searchsorted(times, self._sent + self._settings.part_overlap))
+        first = int(np.searchsorted(times, elapsed, side="right")) - 1
+        last = int(np.searchsorted(times, self._sent + overlap))
         chosen = slice(first, last + 1)
         velocities = self._plan.velocities[chosen].copy()
         velocities[-1] = 0.0
-        return Part(
-            self._start + begin, times[chosen] - begin, self._plan.positions[chosen], velocities
-        )
+        return Part(self._start, times[chosen], self._plan.positions[chosen], velocities)
 
     def _check_tracking(self, elapsed: float, state: WorldState) -> None:
         desired = sample(self._plan.times, self._plan.positions, elapsed)
@@ -160,21 +184,21 @@ class Execution:
                 f"expected at most {self._tolerances[worst]:g} [m, rad]",
             )
 
-    def _check_grasp(self, elapsed: float, phase: str, state: WorldState) -> None:
+    def _check_grasp(self, state: WorldState) -> None:
         """Raise if the hand moves on, but handle or door does not follow."""
-        desired = sample(self._plan.times, self._plan.door, elapsed)
+        phase, desired = self.planned(state.time)
         watched = {
-            PhaseName.PRESS: ("handle", desired[HANDLE], state.handle, self._settings.handle_slip),
-            PhaseName.OPEN: ("door", desired[HINGE], state.hinge, self._settings.door_slip),
+            PhaseName.PRESS: (desired[LATCH], state.handle, self._settings.handle_slip),
+            PhaseName.OPEN: (desired[MOVED], state.hinge, self._settings.door_slip),
         }
         if phase not in watched:
             return
-        what, planned, measured, allowed = watched[phase]
+        planned, measured, allowed = watched[phase]
         if abs(planned - measured) > allowed:
             raise ExecutionError(
                 "slipped",
-                f"the grasp slipped: the {what} is at {measured:.2f} rad, where the hand should "
-                f"have it at {planned:.2f} rad",
+                f"the grasp slipped: what is moved is at {measured:.2f}, where the hand should "
+                f"have it at {planned:.2f} [m, rad]",
             )
 
 
@@ -190,7 +214,7 @@ def sample(
 
 def _tolerances(count: int, settings: ExecutionSettings) -> NDArray[np.float64]:
     """Return the largest tracking errors (J,) of the robot's joints, m and rad."""
-    tolerances = np.full(count, settings.angle_tolerance)
-    tolerances[BASE_POSITION] = settings.position_tolerance
-    tolerances[GRIPPER] = np.inf  # it presses the handle and so never gets where it is sent
-    return tolerances
+    largest = np.full(count, settings.angle_tolerance)
+    largest[BASE_POSITION] = settings.position_tolerance
+    largest[GRIPPER] = np.inf  # it presses the handle and so never gets where it is sent
+    return largest

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_skill.execution.errors import StatesError
-from kmn_skill.planning.layout import HANDLE, HINGE
+from kmn_skill.planning.layout import LATCH, MOVED
 
-ROBOT, DOOR = "joint_states", "door_state"
+ROBOT, DOOR, BASE = "joint_states", "door_state", "odom"
+TURN = 2.0 * np.pi  # radians
 # Joints that do not jump: a handle that is let go springs back faster than anything drives it.
-STEADY = {ROBOT: slice(None), DOOR: slice(HINGE, HINGE + 1)}
+STEADY = {ROBOT: slice(None), BASE: slice(None), DOOR: slice(MOVED, MOVED + 1)}
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class WorldState(NamedTuple):
     robot
         (J,) base, arm and gripper [m, rad].
     hinge, handle
-        Angles of the door, radians.
+        Angles of the door, radians; NaN where nobody tells them.
     """
 
     time: float
@@ -69,9 +70,13 @@ class StateWatch:
     Parameters
     ----------
     joints
-        Names of the joints of `ROBOT` and `DOOR`, for people to read.
+        Names of the joints of what is watched, for people to read: of `ROBOT`, of `BASE` where
+        odometry alone tells of it, and of `DOOR` where somebody measures its angles.
     steady
         Returns the time of a clock that is never adjusted, seconds.
+    continuous
+        Names of joints of which a whole turn changes nothing. Their positions go on where others
+        have them go back to the other end of a turn.
 
     Attributes
     ----------
@@ -88,21 +93,30 @@ class StateWatch:
         settings: StateSettings,
         joints: Mapping[str, Sequence[str]],
         steady: Callable[[], float] = time.monotonic,
+        continuous: Sequence[str] = (),
     ) -> None:
         self.settings, self._steady = settings, steady
         self._names = joints
+        self._continuous = {topic: np.isin(names, continuous) for topic, names in joints.items()}
         self._newest: dict[str, Sample] = {}
         self._received: dict[str, float] = {}
         self._changed = threading.Condition()
         self.breaks, self.last_break = 0, ""
 
+    @property
+    def tells_door(self) -> bool:
+        """Whether somebody measures the door's angles."""
+        return DOOR in self._names
+
     def put(self, topic: str, sample: Sample) -> None:
-        """Take a state of `ROBOT` or `DOOR`."""
+        """Take a state of `ROBOT`, `BASE` or `DOOR`."""
         with self._changed:
-            before = self._newest.get(topic)
-            if before is not None and (text := self._difference(topic, before, sample)):
-                self.breaks += 1
-                self.last_break = text
+            before, told = self._newest.get(topic), sample
+            if before is not None:
+                sample = self._unwrapped(topic, before, told)
+                if text := self._difference(topic, before, sample):
+                    self.breaks += 1
+                    self.last_break, sample = text, told
             self._newest[topic], self._received[topic] = sample, self._steady()
             self._changed.notify_all()
 
@@ -138,13 +152,40 @@ class StateWatch:
                         f"{topic} is {age:.2f} s old by its stamp, expected at most {timeout:g} s; "
                         "do the nodes share a clock (use_sim_time)?",
                     )
-            robot, door = self._newest[ROBOT], self._newest[DOOR].positions
-        return WorldState(robot.time, robot.positions, float(door[HINGE]), float(door[HANDLE]))
+            robot, door = self._newest[ROBOT], self._newest.get(DOOR)
+        angles: NDArray[np.float64] = np.zeros(2)  # of what nothing unlatches one alone is told
+        angles[: None if door is None else door.positions.size] = (
+            np.nan if door is None else door.positions
+        )
+        return WorldState(robot.time, robot.positions, float(angles[MOVED]), float(angles[LATCH]))
+
+    def robot(self, now: float, timeout: float) -> Sample | None:
+        """Return where the robot was measured last; None if that is not known.
+
+        Parameters
+        ----------
+        now
+            Present time on the clock of the states, seconds.
+        timeout
+            Largest age, by its time and by when it came, seconds.
+        """
+        with self._changed:
+            newest = self._newest.get(ROBOT)
+            if newest is None or self._steady() - self._received[ROBOT] > timeout:
+                return None
+            return newest if abs(now - newest.time) <= timeout else None
 
     def wait(self, timeout: float) -> None:
         """Wait until a state comes, but no longer than so many seconds."""
         with self._changed:
             self._changed.wait(timeout)
+
+    def _unwrapped(self, topic: str, before: Sample, after: Sample) -> Sample:
+        """Return the second state with its continuous joints nearest to where they were."""
+        turns = np.round((before.positions - after.positions) / TURN)
+        return after._replace(
+            positions=after.positions + np.where(self._continuous[topic], turns * TURN, 0.0)
+        )
 
     def _difference(self, topic: str, before: Sample, after: Sample) -> str:
         """Return why two states cannot belong to one motion; empty if they can."""

@@ -1,4 +1,4 @@
-"""A door that no one measured is seen by a depth camera, morphed, planned for and opened."""
+"""An object that no one measured is seen by a depth camera, morphed, planned for and opened."""
 
 from __future__ import annotations
 
@@ -13,35 +13,46 @@ from kmn_perception.command_line.columns import columns
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
-from kmn_skill.experiments.evaluate import NOISES, random_rooms
+from kmn_skill.experiments.evaluate import NOISES, add_control, random_rooms
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.narrator import Narrator
-from kmn_skill.experiments.settings import MODES, Experiment
+from kmn_skill.experiments.settings import (
+    Experiment,
+    add_mode_option,
+    add_object_option,
+    add_robot_option,
+    chosen_mode,
+)
 
 
 def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     """Open one random door and tell how it went; return whether it is open."""
-    model = experiment.kinematic_model(options.room)
-    values = experiment.random_doors(options.room, 1, options.seed)[0]
-    goal, pace = experiment.goal(options.mode), experiment.demo
-    sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed, "placement": "given"}
+    model = experiment.kinematic_model(options.object, options.room)
+    values = experiment.random_objects(model, options.room, 1, options.seed)[0]
+    options.mode = chosen_mode(model.actions[0], options.mode)
+    task, pace = (model.actions[0], options.mode), experiment.demo
+    sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed}
     sim["renderer"] = "software"  # whose light is ours
     options.out.mkdir(parents=True, exist_ok=True)
-    recording = options.out / f"door_{options.mode}_{options.seed}.gif"
+    recording = options.out / f"{model.name}_{options.mode}_{options.seed}.gif"
     strip = recording.with_suffix(".png")
     nodes = "sim_node, morph_node" if options.parameters == "perceived" else "sim_node"
     print(f"starting {nodes} and skill_node (20 seconds)", flush=True)
-    with DoorSystem(sim, options.parameters, experiment, options.room) as system:
+    with DoorSystem(sim, options, experiment) as system:
         system.show(values, options.mode, random_rooms(options, 1)[0])
         system.record(recording, experiment.recording.rate)
-        print(f"opening a door (seed {options.seed}, {options.mode}):", flush=True)
-        opened = system.open(goal, Narrator().tell)
+        print(f"opening a {model.name} (seed {options.seed}, {options.mode}):", flush=True)
+        narrator = Narrator()
+        opened = system.open(
+            experiment.goal(*task),
+            lambda now: narrator.tell(now.phase, now.progress, now.position),
+        )
         system.record(None, experiment.recording.rate)
     save_strip(recording, strip, experiment.recording.strip)
     print(comparison(model, values, opened.perceived))
     print(summary(opened))
     print(f"recording {recording}, pictures {strip}")
-    return bool(opened.result.success) and experiment.is_open(options.mode, opened.hinge)
+    return bool(opened.result.success) and experiment.is_open(*task, opened.hinge)
 
 
 def comparison(
@@ -62,16 +73,16 @@ def summary(opened: Opened) -> str:
     text = (
         f"planned within {result.planning_time:.2f} s, clearance {1e3 * result.clearance:.1f} mm, "
         f"contact error {1e3 * result.contact_error:.2f} mm, attempts {result.attempts}\n"
-        f"handle turned to {result.handle_angle:.2f} rad, door opened to {opened.hinge:.2f} rad"
+        f"opened to {opened.hinge:.2f}, told as {result.position:.2f} [m, rad]"
     )
-    return text if result.success else f"{text}\nthe door was not opened: {result.reason}"
+    return text if result.success else f"{text}\nit was not opened: {result.reason}"
 
 
 def arguments(argv: list[str]) -> argparse.Namespace:
     """Parse the command line without its ROS arguments."""
     parser = argparse.ArgumentParser(prog="demo", description=__doc__)
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of door and noise")
-    parser.add_argument("--mode", choices=tuple(MODES), default="pull")
+    add_mode_option(parser)
     parser.add_argument(
         "--parameters",
         choices=("perceived", "true"),
@@ -83,6 +94,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         action="store_true",
         help="the door stands in a room, and is seen by depth and image",
     )
+    add_control(parser)
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(
         "--out",
@@ -90,6 +102,8 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         default=Path("outputs/door_demo"),
         help="folder of recording and pictures",
     )
+    add_robot_option(parser)
+    add_object_option(parser)
     return parser.parse_args(argv)
 
 
@@ -98,5 +112,5 @@ def main() -> int:
     options = arguments(own_arguments())
     with ros_session("demo"):
         is_open = run(options, Experiment.load())
-    print("the door is open" if is_open else "the door is NOT open")
+    print("it is open" if is_open else "it is NOT open")
     return 0 if is_open else 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import tempfile
 from collections.abc import Callable
@@ -11,25 +12,34 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-from kmn_msgs.action import OpenDoor
+from kmn_msgs.action import OperateJoint
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.configuration import resources
-from kmn_perception.configuration.settings import Count, NonNegative, load_settings
-from kmn_perception.ros.node_process import NodeProcess, ProcessClient, parameter_arguments
+from kmn_perception.ros.node_process import (
+    NodeProcess,
+    ProcessClient,
+    namespace_arguments,
+    parameter_arguments,
+)
 from kmn_skill.execution.goal import Goal
+from kmn_skill.experiments.patience import Patience
 from kmn_skill.experiments.settings import Experiment
-from kmn_skill.planning.layout import HINGE
+from kmn_skill.experiments.stopwatch import Measured, Stopwatch
+from kmn_skill.planning.layout import MOVED
 from kmn_skill.planning.surroundings import WALL
 
 QUEUE_DEPTH = 10
+ON_ROBOT = "base"  # where sim_node has a camera that moves with the robot
 PROTOTYPE_PERIOD = 0.2  # seconds between two messages of the prototype
 SOURCES = {  # of the door's parameters, and the topic that skill_node takes them from
     "perceived": "morphing_parameters",
@@ -45,29 +55,6 @@ class Room(NamedTuple):
     recess: float
 
 
-class Patience(NamedTuple):
-    """How long what is late is waited for.
-
-    Attributes
-    ----------
-    new_frames
-        Of another door, after which skill_node relies on no older one.
-    skill_node
-        Parameters of skill_node, in seconds of real time.
-    skill_node_in_rooms
-        Parameters of skill_node for doors in rooms.
-    """
-
-    new_frames: Count
-    skill_node: dict[str, NonNegative]
-    skill_node_in_rooms: dict[str, NonNegative]
-
-    @classmethod
-    def load(cls) -> Patience:
-        """Read ``config/skill/system.yaml``."""
-        return load_settings(cls, resources.find("config/skill", "system"))
-
-
 class Opened(NamedTuple):
     """What became of a goal.
 
@@ -80,11 +67,14 @@ class Opened(NamedTuple):
         were none, those that it refused.
     hinge
         Angle of the door in the physics at the end, radians.
+    measured
+        Times, forces and errors on the way.
     """
 
-    result: OpenDoor.Result
+    result: OperateJoint.Result
     perceived: NDArray[np.float64]
     hinge: float
+    measured: Measured
 
 
 class DoorSystem:
@@ -94,12 +84,13 @@ class DoorSystem:
     ----------
     sim
         Parameters of sim_node.
-    source
-        Where skill_node takes the door from, one of ``SOURCES``.
+    options
+        Of a program: ``robot``; ``object``, model of what is opened, and ``mode``, to which side;
+        ``parameters``, where skill_node takes it from, one of ``SOURCES``; ``room``, whether it is
+        a door that stands in a room, and is perceived by depth and image; and ``control``, how
+        skill_node moves the robot, ``topic`` or ``action``.
     experiment
         Models of the doors, and how long to wait for what.
-    in_rooms
-        Whether the doors stand in rooms, and are perceived by depth and image.
 
     Raises
     ------
@@ -108,15 +99,22 @@ class DoorSystem:
     """
 
     def __init__(
-        self, sim: dict[str, Any], source: str, experiment: Experiment, in_rooms: bool
+        self, sim: dict[str, Any], options: argparse.Namespace, experiment: Experiment
     ) -> None:
-        model = experiment.room.model if in_rooms else experiment.model
-        self._sim = {**sim, "model": model, "image": in_rooms}
+        in_rooms, robot = options.room, options.robot
+        model = experiment.room.model if in_rooms else options.object or experiment.model
+        around = {"robot": robot, "model": model, "direction": options.mode, "image": in_rooms}
+        self._sim = {**sim, **around}
         if in_rooms:
             self._sim["renderer"] = "software"  # EGL's highlights are none of a room's light
-        self._source, self._timeouts, self._in_rooms = source, experiment.timeouts, in_rooms
-        self._patience = Patience.load()
-        self._processes: list[NodeProcess] = []
+        self._source, self._timeouts, self._in_rooms = (
+            options.parameters,
+            experiment.timeouts,
+            in_rooms,
+        )
+        self._patience, self._opened = Patience.load(), experiment.opened
+        self._control = options.control
+        self._processes: dict[str, NodeProcess] = {}
         self._stack = ExitStack()
         self._truth: MorphingParameters | None = None
         self._seen: list[MorphingParameters] = []
@@ -126,15 +124,16 @@ class DoorSystem:
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             namespace = f"/doors_{os.getpid()}"  # whatever else runs here is not disturbed
-            remaps = [f"__ns:={namespace}", f"/clock:={namespace}/clock"]
+            alone = namespace_arguments(namespace)
             for package, executable, parameters, more in self._nodes():
-                renamed = [part for text in (*remaps, *more) for part in ("-r", text)]
-                arguments = [*renamed, *parameter_arguments(parameters)]
+                renamed = [part for text in more for part in ("-r", text)]
+                arguments = [*alone, *renamed, *parameter_arguments(parameters)]
                 process = NodeProcess(package, executable, arguments, folder / executable)
-                self._processes.append(stack.enter_context(process))
+                self._processes[executable] = stack.enter_context(process)
             self._node = Node("doors", cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
+            self._stopwatch = Stopwatch(f"{namespace}/sim_node")
             stack.callback(self._node.destroy_node)
-            self._client = ProcessClient(self._node, self._processes)
+            self._client = ProcessClient(self._node, list(self._processes.values()))
             self._connect()
             self._client.wait(self._is_ready, self._timeouts.start, "the system")
             self._stack = stack.pop_all()
@@ -171,18 +170,34 @@ class DoorSystem:
             lambda: self._count_since(since) >= frames, scene, "what perceives the door"
         )
 
-    def open(self, goal: Goal, feedback: Callable[[OpenDoor.Feedback], None]) -> Opened:
+    def open(self, goal: Goal, feedback: Callable[[OperateJoint.Feedback], None]) -> Opened:
         """Open the door that is there; ``feedback`` is told what is being done."""
         last = next((m for m in reversed(self._seen) if m.status == m.OK), self._seen[-1])
         perceived = np.array([*last.theta, *last.gamma])
-        request = OpenDoor.Goal(handle_angle=goal.handle_angle, door_angle=goal.door_angle)
+
+        def progress(message: OperateJoint.Feedback) -> None:
+            self._stopwatch.enter(message.phase)
+            feedback(message)
+
+        self._stopwatch.start(self._opened * goal.target)
+        answer = self._send(goal, progress)
+        self._client.wait(answer.done, self._timeouts.goal, "skill_node")
+        self._stopwatch.stop()
+        reported = self._stopwatch.reports
+        self._client.wait(  # for the report of the last second
+            lambda: self._stopwatch.reports > reported, self._timeouts.scene, "sim_node"
+        )
+        return Opened(answer.result().result, perceived, self._hinge, self._stopwatch.measured)
+
+    def _send(self, goal: Goal, feedback: Callable[[OperateJoint.Feedback], None]) -> Future:
+        """Send a goal, and return its result to come."""
+        request = OperateJoint.Goal(target=goal.target)
         accepted = self._action.send_goal_async(
             request, feedback_callback=lambda message: feedback(message.feedback)
         )
         self._client.wait(accepted.done, self._timeouts.scene, "skill_node")
-        answer = accepted.result().get_result_async()
-        self._client.wait(answer.done, self._timeouts.goal, "skill_node")
-        return Opened(answer.result().result, perceived, self._hinge)
+        answer: Future = accepted.result().get_result_async()
+        return answer
 
     def record(self, file: Path | None, rate: float) -> None:
         """Let sim_node record what follows with so many pictures a second; None ends that."""
@@ -191,10 +206,11 @@ class DoorSystem:
     def _nodes(self) -> list[tuple[str, str, dict[str, Any], list[str]]]:
         """Return packages, executables, parameters and remappings of the nodes that are needed."""
         simulated = {"use_sim_time": True, "model": self._sim["model"]}
+        skill = {"robot": self._sim["robot"], **simulated, **self._skill_parameters()}
         door = f"morphing_parameters:={SOURCES[self._source]}"
         nodes: list[tuple[str, str, dict[str, Any], list[str]]] = [
             ("kmn_sim", "sim_node", {**self._sim, "publish_clock": True}, []),
-            ("kmn_skill", "skill_node", {**simulated, **self._skill_parameters()}, [door]),
+            ("kmn_skill", "skill_node", skill, [door]),
         ]
         if self._source == "perceived":
             morph = {**simulated, "reliability": "reliable"}
@@ -203,10 +219,16 @@ class DoorSystem:
             nodes.append(("kmn_perception", "morph_node", morph, []))
         return nodes
 
-    def _skill_parameters(self) -> dict[str, float]:
+    def _skill_parameters(self) -> dict[str, Any]:
         """Return the parameters of skill_node, in simulated seconds."""
         pace = max(1.0, self._sim["real_time_factor"])
+        paced: dict[str, Any]
         paced = {name: pace * value for name, value in self._patience.skill_node.items()}
+        paced["control"] = self._control
+        if self._sim.get("camera_mount") == ON_ROBOT:
+            paced |= self._patience.skill_node_with_camera
+            if self._sim.get("mount_offset"):
+                paced |= self._patience.skill_node_with_faults
         return {**paced, **(self._patience.skill_node_in_rooms if self._in_rooms else {})}
 
     def _connect(self) -> None:
@@ -217,7 +239,10 @@ class DoorSystem:
             MorphingParameters, SOURCES[self._source], self._on_parameters, QUEUE_DEPTH
         )
         node.create_subscription(JointState, "door_state", self._on_door, QUEUE_DEPTH)
-        self._action = ActionClient(node, OpenDoor, "open_door")
+        watch = self._stopwatch
+        node.create_subscription(WrenchStamped, "handle_force", watch.on_force, QUEUE_DEPTH)
+        node.create_subscription(DiagnosticArray, "/diagnostics", watch.on_reports, QUEUE_DEPTH)
+        self._action = ActionClient(node, OperateJoint, "operate_joint")
         self._setting = node.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )
@@ -254,7 +279,8 @@ class DoorSystem:
         self._seen.append(message)
 
     def _on_door(self, message: JointState) -> None:
-        self._hinge = message.position[HINGE]
+        self._hinge = message.position[MOVED]
+        self._stopwatch.on_door(message)
 
     def _publish_prototype(self) -> None:
         """Publish the prototype with the stamp of the true door."""

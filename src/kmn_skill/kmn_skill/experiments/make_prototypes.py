@@ -1,13 +1,15 @@
-"""Solve the policy for some doors without solutions to start from, and keep the best.
+"""Solve the policy for an object without solutions to start from, and keep the best.
 
-Those in a wall are solved one from the other.
+Those for doors in a wall are solved one from the other.
 
-Run as ``./run kmn_skill make_prototypes FILE``; it writes ``config/skill/prototypes.json``.
+Run as ``./run kmn_skill make_prototypes --robot R --object M config/skill/prototypes/R/M.json``.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,40 +17,54 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.experiments.settings import MODES, Experiment
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.parts import WORLD
+from kmn_skill.experiments.settings import (
+    Experiment,
+    add_object_option,
+    add_robot_option,
+    modes_of,
+)
 from kmn_skill.planning.check import PlanRejected
-from kmn_skill.planning.layout import ARM, BASE, BASE_AND_ARM, DOOR, GRIPPER, HANDLE, HINGE, ROBOT
+from kmn_skill.planning.layout import (
+    ARM,
+    BASE,
+    BASE_AND_ARM,
+    GRIPPER,
+    LATCH,
+    MOVED,
+    OBJECT_JOINTS,
+    ROBOT,
+)
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import PUSH, PUSH_IN_WALL, Prototypes, Solution
-from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.solver import Solver
 from kmn_skill.planning.transfer import transfer
 
 
 def key_frame(
     request: PlanRequest,
-    skill: SkillSettings,
+    setup: PlanningSetup,
     side: float,
     spread: float,
     generator: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Return a guess (T + 1, D): drive before the door, hold a random posture, follow the door."""
-    slices = skill.planner.coarse
+    robot, slices = setup.robot, setup.settings.planner.coarse
     times = np.arange(PHASE_COUNT * slices + 1) / slices
     path = np.zeros((len(times), request.configuration.size))
     posture = request.start.copy()
-    posture[BASE] = skill.policy.base[0], side, 0.0
+    posture[BASE] = robot.planning.stance[0], side, 0.0
     arm = posture[ARM]
     arm += generator.normal(0.0, spread, arm.size)
-    posture[GRIPPER] = skill.policy.open_gripper
+    posture[GRIPPER] = robot.planning.grip.open
     reached = np.clip(times / PhaseEnd.PRE_GRASP, 0.0, 1.0)[:, None]
     path[:, ROBOT] = request.start + (posture - request.start) * reached
     opened = np.clip(times - PhaseEnd.PRESSED, 0.0, 1.0)
-    path[:, DOOR][:, HINGE] = opened * np.sign(request.door_angle)
-    path[:, DOOR][:, HANDLE] = -np.clip(times - PhaseEnd.GRASP, 0.0, 1.0)
+    path[:, OBJECT_JOINTS][:, MOVED] = opened * request.target
+    path[:, OBJECT_JOINTS][:, LATCH] = request.unlatched * np.clip(times - PhaseEnd.GRASP, 0.0, 1.0)
     return path
 
 
@@ -76,9 +92,9 @@ def best_solution(
     found: list[Solution] = []
     for _ in tqdm(range(tries), unit="guess"):
         side = generator.uniform(*sides) if sides[0] < sides[1] else sides[0]
-        path = key_frame(request, setup.settings, side, spread, generator)
+        path = key_frame(request, setup, side, spread, generator)
         try:
-            guess = transfer(Solution(request.gamma, path), setup.model, request)
+            guess = transfer(Solution(request.gamma, path), setup.model, setup.action, request)
             found.append(solved(solver, request, guess))
         except PlanRejected:
             continue
@@ -93,24 +109,61 @@ def solved(solver: Solver, request: PlanRequest, guess: NDArray[np.float64]) -> 
     return Solution(request.gamma, np.vstack([request.configuration, path]))
 
 
-def walled_solutions(setup: PlanningSetup, experiment: Experiment, mode: str) -> list[Solution]:
-    """Return solutions for doors in a wall, each from the one before; see `best_solution`."""
-    solver, settings = Solver(setup), experiment.prototypes
+def free_solutions(
+    solver: Solver, setup: PlanningSetup, experiment: Experiment, tries: int
+) -> dict[str, Solution]:
+    """Return solutions for the prototype that stands alone, to the sides to which it opens.
+
+    Where random guesses lead to none, the other one is a guess: up to the open latch the same.
+    """
+    guesses, found = experiment.prototypes, {}
+    requests = {
+        mode: experiment.request(setup, setup.model.prototype, mode)
+        for mode in modes_of(setup.action)
+    }
+    for mode, request in requests.items():
+        sides = guesses.side, guesses.side
+        with suppress(PlanRejected):
+            found[mode] = best_solution(solver, setup, request, sides, guesses.spread, tries)
+    if not found:
+        raise PlanRejected(
+            f"none of {tries} guesses leads to a solution, to {' or '.join(requests)}"
+        )
+    for mode, request in requests.items():
+        if mode not in found:
+            (other,) = found.values()
+            found[mode] = solved(
+                solver, request, transfer(other, setup.model, setup.action, request)
+            )
+    return found
+
+
+def walled_solutions(
+    solver: Solver, setup: PlanningSetup, experiment: Experiment, mode: str
+) -> list[Solution]:
+    """Return solutions for doors in a wall, each from the last one that was found.
+
+    Not every robot opens every door in a wall. See `best_solution`.
+    """
+    settings = experiment.prototypes
     names = [parameter.name for parameter in setup.model.parameters]
-    kept: list[Solution] = []
-    before: Solution | None = None
-    for door in tqdm(settings.walled.doors, unit="door"):
+    doors, tries, sides = settings.walled
+    requests = []
+    for door in doors:
         values = setup.model.prototype.copy()
         for name, value in door.gamma.items():
             values[names.index(name)] = value
-        request = experiment.request(setup, values, mode, door.recess)
-        if before is None:
-            _, tries, sides = settings.walled
-            before = best_solution(solver, setup, request, sides, settings.spread, tries)
-        else:
-            before = solved(solver, request, before.path[1:])
-        kept += [before] if door.kept else []
-    return kept
+        requests.append(experiment.request(setup, values, mode, door.recess))
+    last = best_solution(solver, setup, requests[0], sides, settings.spread, tries)
+    kept = [last] if doors[0].kept else []
+    for door, request in zip(tqdm(doors[1:], unit="door"), requests[1:], strict=True):
+        try:
+            last = solved(solver, request, last.path[1:])
+        except (PlanRejected, ConfigurationError, OSError) as error:
+            tqdm.write(f"{door}: {error}", file=sys.stderr)
+            continue
+        kept += [last] if door.kept else []
+    return kept or [last]
 
 
 def _roughness(solution: Solution) -> float:
@@ -123,17 +176,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=output_file, help="JSON file to write")
     parser.add_argument("--tries", type=whole_number(1), default=20, help="guesses, default 20")
+    add_robot_option(parser)
+    add_object_option(parser)
     options = parser.parse_args()
-    experiment = Experiment.load()
-    setup = PlanningSetup.load(KinematicModel.load(experiment.model))
-    solver, guesses = Solver(setup), experiment.prototypes
-    solutions = {}
-    for mode in MODES:
-        request = experiment.request(setup, setup.model.prototype, mode)
-        sides = guesses.side, guesses.side
-        solutions[mode] = [
-            best_solution(solver, setup, request, sides, guesses.spread, options.tries)
-        ]
-    solutions[PUSH_IN_WALL] = walled_solutions(setup, experiment, PUSH)
+    try:
+        experiment = Experiment.load()
+        setup = PlanningSetup.load(experiment.kinematic_model(options.object), options.robot)
+        solver = Solver(setup)
+        free = free_solutions(solver, setup, experiment, options.tries)
+        solutions = {mode: [solution] for mode, solution in free.items()}
+        if setup.action.joint.parent == WORLD:  # it may stand in a wall
+            solutions[PUSH_IN_WALL] = walled_solutions(solver, setup, experiment, PUSH)
+    except (OSError, ConfigurationError, PlanRejected) as error:
+        print(f"make_prototypes: {error}", file=sys.stderr)
+        return 1
     Prototypes(setup.joint_names, solutions).save(Path(options.file))
+    kinds = ", ".join(f"{name}: {len(kept)}" for name, kept in solutions.items())
+    print(f"motions of '{setup.model.name}' by {setup.robot.name} ({kinds}): {options.file}")
     return 0

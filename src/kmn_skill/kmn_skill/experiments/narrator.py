@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from kmn_msgs.action import OpenDoor
-
 
 class Narrator:
     """Prints what is being done, when it changes."""
@@ -11,12 +9,9 @@ class Narrator:
     def __init__(self) -> None:
         self._told = ""
 
-    def tell(self, feedback: OpenDoor.Feedback) -> None:
-        """Print the phase, if it is another one."""
-        if feedback.phase != self._told:
-            self._told = feedback.phase
-            print(
-                f"  {feedback.phase:7s} {100 * feedback.progress:3.0f} %   "
-                f"handle {feedback.handle_angle:5.2f} rad   door {feedback.door_angle:5.2f} rad",
-                flush=True,
-            )
+    def tell(self, phase: str, progress: float, position: float) -> None:
+        """Print the phase, if it is another one, and how far the object is open (m or rad)."""
+        if phase != self._told:
+            self._told = phase
+            opened = round(position, 2) + 0.0  # never -0
+            print(f"  {phase:7s} {100 * progress:3.0f} %   open by {opened:5.2f}", flush=True)

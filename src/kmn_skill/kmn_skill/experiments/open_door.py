@@ -14,12 +14,14 @@ from rclpy.action.client import ActionClient
 from rclpy.node import Node
 
 from kmn_msgs.action import OpenDoor
+from kmn_perception.model.actions import Action
 from kmn_perception.ros.node_process import ProcessError
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.execution.goal import Goal
 from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
 from kmn_skill.planning.prototypes import PULL
+from kmn_skill.ros.error_codes import code_name
 
 ACTION = "open_door"
 POLL_PERIOD = 0.1  # seconds
@@ -64,9 +66,15 @@ class DoorOpener:
         )
         if self._interrupted:
             raise KeyboardInterrupt
-        narrator, gone = Narrator(), "the action server '{}' is gone since {:g} s"
+        narrator = Narrator()
+
+        def tell(feedback: OpenDoor.Feedback) -> None:
+            narrator.tell(feedback.phase, feedback.progress, feedback.door_angle)
+
+        gone = "the action server '{}' is gone since {:g} s"
         sent = self._action.send_goal_async(
-            OpenDoor.Goal(**goal._asdict()), lambda message: narrator.tell(message.feedback)
+            OpenDoor.Goal(handle_angle=goal.unlatched, door_angle=goal.target),
+            lambda message: tell(message.feedback),
         )
         self._wait(sent.done, gone)
         handle = sent.result()
@@ -95,14 +103,14 @@ class DoorOpener:
             rclpy.spin_once(self._node, timeout_sec=POLL_PERIOD)
 
 
-def arguments(argv: list[str], experiment: Experiment) -> argparse.Namespace:
+def arguments(argv: list[str], action: Action) -> argparse.Namespace:
     """Parse the command line without its ROS arguments."""
     parser = argparse.ArgumentParser(prog=ACTION, description=__doc__)
     parser.add_argument(
         "--handle-angle",
         type=float,
-        default=experiment.handle_angle,
-        help=f"to which the handle is pressed, radians; default {experiment.handle_angle:g}",
+        default=action.unlatched,
+        help=f"to which the handle is pressed, radians; default {action.unlatched:g}",
     )
     door = parser.add_mutually_exclusive_group()
     door.add_argument(
@@ -112,7 +120,7 @@ def arguments(argv: list[str], experiment: Experiment) -> argparse.Namespace:
         "--mode",
         choices=tuple(MODES),
         default=PULL,
-        help=f"instead of the angle: {experiment.door_angle:g} rad to this side, default {PULL}",
+        help=f"instead of the angle: {abs(action.target):g} rad to this side, default {PULL}",
     )
     return parser.parse_args(argv)
 
@@ -120,10 +128,11 @@ def arguments(argv: list[str], experiment: Experiment) -> argparse.Namespace:
 def main() -> int:
     """Run the executable ``open_door``; its exit status is 0 if the door is open."""
     experiment = Experiment.load()
-    options = arguments(own_arguments(), experiment)
+    action = experiment.kinematic_model().actions[0]
+    options = arguments(own_arguments(), action)
     angle = options.door_angle
     if angle is None:
-        angle = experiment.goal(options.mode).door_angle
+        angle = experiment.goal(action, options.mode).target
     with ros_session(ACTION):
         node = Node(ACTION)
         try:
@@ -134,7 +143,7 @@ def main() -> int:
         finally:
             node.destroy_node()
     if not result.success:
-        print(f"the door was not opened: {result.reason}")
+        print(f"the door was not opened, {code_name(result.error_code)}: {result.reason}")
         return 1
     print(f"the door is open by {result.door_angle:.2f} rad")
     return 0

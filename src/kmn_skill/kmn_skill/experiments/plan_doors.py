@@ -15,7 +15,14 @@ from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
-from kmn_skill.experiments.settings import MODES, Experiment, random_recesses
+from kmn_skill.experiments.settings import (
+    Experiment,
+    add_mode_option,
+    add_object_option,
+    add_robot_option,
+    chosen_mode,
+    random_recesses,
+)
 from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
@@ -94,25 +101,35 @@ def main() -> int:
     """Run the command."""
     parser = argparse.ArgumentParser(prog="plan_doors", description=__doc__)
     parser.add_argument("--doors", type=whole_number(1), default=100, help="default 100")
-    parser.add_argument("--mode", choices=tuple(MODES), default="pull")
+    add_mode_option(parser)
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of the doors")
     parser.add_argument("--room", action="store_true", help="the doors stand in walls")
     parser.add_argument("--json", type=output_file, help="file to write the result to")
+    add_robot_option(parser)
+    add_object_option(parser)
     options = parser.parse_args()
     experiment = Experiment.load()
-    setup = PlanningSetup.load(experiment.kinematic_model(options.room))
-    doors = experiment.random_doors(options.room, options.doors, options.seed)
+    model = experiment.kinematic_model(options.object, options.room)
+    setup = PlanningSetup.load(model, options.robot)
+    options.mode = chosen_mode(setup.action, options.mode)
+    doors = experiment.random_objects(model, options.room, options.doors, options.seed)
     recesses = iter(random_recesses(options.mode, options.doors, options.seed))
 
     def request(values: NDArray[np.float64]) -> PlanRequest:
         recess = next(recesses) if options.room else None
         return experiment.request(setup, values, options.mode, recess)
 
-    with Planner(setup, Prototypes.load()) as planner:
+    with Planner(setup, Prototypes.load(setup.action.motions, options.robot)) as planner:
         planned = plan_doors(planner, doors, request)
     result = tally(planned)
     print(table(result))
     if options.json:
-        named = {"mode": options.mode, "seed": options.seed, "room": options.room}
+        named = {
+            "robot": options.robot,
+            "object": model.name,
+            "mode": options.mode,
+            "seed": options.seed,
+            "room": options.room,
+        }
         write_json(options.json, {**named, **result})
     return 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -9,12 +11,21 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.settings import Interval, NonNegative, Positive, load_settings
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.configuration.settings import (
+    Fraction,
+    Interval,
+    NonNegative,
+    Positive,
+    load_settings,
+)
+from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.goal import Goal
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import PULL, PUSH
+from kmn_skill.planning.robot import default_robot
 from kmn_skill.planning.surroundings import Obstacle, wall_around
 
 MODES = {PULL: -1.0, PUSH: 1.0}  # and the sign of the door's angle
@@ -115,7 +126,7 @@ class RoomDoors(NamedTuple):
 
 
 class Experiment(NamedTuple):
-    """What is done with each door.
+    """What is done with each object.
 
     Attributes
     ----------
@@ -123,12 +134,12 @@ class Experiment(NamedTuple):
         Kinematic model of doors that stand alone.
     room
         Doors that stand in rooms.
-    handle_angle, door_angle
-        Of the goal, radians; the door's without sign.
     opened
-        Angle from which on a door counts as open, radians.
-    evaluation, demo
-        How fast each of them runs.
+        Part of its target from which on an object counts as open.
+    evaluation, real_time, demo
+        How fast each of them runs: evaluations, those whose times are looked at, and the demo.
+    faults
+        Parameters of sim_node where nothing is quite as it is told.
     timeouts, recording
         How long to wait for what, and what is recorded.
     prototypes
@@ -137,10 +148,10 @@ class Experiment(NamedTuple):
 
     model: str
     room: RoomDoors
-    handle_angle: float
-    door_angle: Positive
-    opened: Positive
+    opened: Fraction
     evaluation: Pace
+    real_time: Pace
+    faults: dict[str, Positive]
     demo: Pace
     timeouts: Timeouts
     recording: Recording
@@ -151,21 +162,33 @@ class Experiment(NamedTuple):
         """Read the file; raise ``ConfigurationError`` if it is wrong."""
         return load_settings(cls, resources.find("config/skill", "experiment"))
 
-    def kinematic_model(self, in_room: bool) -> KinematicModel:
-        """Load the model of doors that stand in rooms, or alone."""
-        return KinematicModel.load(self.room.model if in_room else self.model)
+    def kinematic_model(self, name: str | Path = "", in_room: bool = False) -> KinematicModel:
+        """Load the model of a name, by default that of doors that stand alone, or in rooms.
 
-    def random_doors(self, in_room: bool, count: int, seed: int) -> NDArray[np.float64]:
+        Raises
+        ------
+        ConfigurationError
+            If another object than a door is to stand in a room.
+        """
+        if in_room and name not in ("", self.room.model):
+            raise ConfigurationError(
+                f"rooms are for '{self.room.model}', not for '{name}': leave one of them out"
+            )
+        return KinematicModel.load(self.room.model if in_room else name or self.model)
+
+    def random_objects(
+        self, model: KinematicModel, in_room: bool, count: int, seed: int
+    ) -> NDArray[np.float64]:
         """Return morphing parameters (count, n + m): alone, over the model's whole limits."""
-        model, generator = self.kinematic_model(in_room), np.random.default_rng(seed)
+        generator = np.random.default_rng(seed)
         if not in_room:
             return model.sample(generator, count)
         limits = np.array([self.room.limits[each.name] for each in model.parameters])
         return generator.uniform(limits[:, 0], limits[:, 1], (count, len(limits)))
 
-    def goal(self, mode: str) -> Goal:
-        """Return the goal of a mode, ``pull`` or ``push``."""
-        return Goal(self.handle_angle, MODES[mode] * self.door_angle)
+    def goal(self, action: Action, mode: str) -> Goal:
+        """Return the goal of an action to a side, ``pull`` or ``push``."""
+        return Goal(action.unlatched, MODES[mode] * abs(action.target))
 
     def request(
         self,
@@ -181,16 +204,65 @@ class Experiment(NamedTuple):
         recess
             Of the panel in its wall, metres; None: there is no wall.
         """
-        closed, goal = np.zeros(len(setup.model.joints)), self.goal(mode)
+        closed, goal = np.zeros(2), self.goal(setup.action, mode)
         theta, gamma = setup.model.split(values)
         around: tuple[Obstacle, ...] = ()
         if recess is not None:
-            around = wall_around(setup.model, gamma, recess, setup.settings.surroundings)
-        return PlanRequest(theta, gamma, setup.robot.home, closed, *goal, around)
+            panel = setup.model.body(setup.action.joint.body)
+            around = wall_around(panel, gamma, recess, setup.settings.surroundings)
+        start = setup.robot.home
+        return PlanRequest(theta, gamma, start, closed, goal.unlatched, goal.target, around)
 
-    def is_open(self, mode: str, hinge: float) -> bool:
-        """Tell whether a door at this hinge angle (rad) is open to the right side."""
-        return MODES[mode] * hinge >= self.opened
+    def is_open(self, action: Action, mode: str, position: float) -> bool:
+        """Tell whether an object whose joint is at a position (m or rad) is open to a side."""
+        return MODES[mode] * position >= self.opened * abs(action.target)
+
+
+def modes_of(action: Action) -> tuple[str, ...]:
+    """Return to which sides an action can move its joint, that of its target first."""
+    low, high = action.joint.limits
+    found = [mode for mode, sign in MODES.items() if low <= sign * abs(action.target) <= high]
+    return tuple(sorted(found, key=lambda mode: MODES[mode] * action.target, reverse=True))
+
+
+def chosen_mode(action: Action, asked: str) -> str:
+    """Return the side to which to open: the one that is asked for, else that of the target.
+
+    Raises
+    ------
+    ConfigurationError
+        If the joint does not open to that side.
+    """
+    modes = modes_of(action)
+    if asked and asked not in modes:
+        raise ConfigurationError(
+            f"the joint '{action.joint.name}' does not open by {asked}, but by {' or '.join(modes)}"
+        )
+    return asked or modes[0]
+
+
+def add_mode_option(parser: argparse.ArgumentParser) -> None:
+    """Let a program be told the side to which objects are opened."""
+    parser.add_argument(
+        "--mode",
+        choices=tuple(MODES),
+        default="",
+        help="the side to which it is opened; default that of the target in its model's file",
+    )
+
+
+def add_object_option(parser: argparse.ArgumentParser) -> None:
+    """Let a program be told the object."""
+    parser.add_argument(
+        "--object", default="", help="name in config/models, or a file; default a door"
+    )
+
+
+def add_robot_option(parser: argparse.ArgumentParser) -> None:
+    """Let a program be told the robot."""
+    parser.add_argument(
+        "--robot", default=default_robot(), help="name in config/robots, default %(default)s"
+    )
 
 
 class RecessLimits(NamedTuple):

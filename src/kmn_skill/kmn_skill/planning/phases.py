@@ -20,11 +20,13 @@ PHASE_COUNT = len(PhaseEnd)
 class PhaseName:
     """Names of what is being done; a plan has all phases from `REACH` on.
 
-    `WAIT` and `PLAN` come before the plan. It begins with `RELEASE` only if the hand is at the
-    handle. `REACH` lasts up to `PhaseEnd.GRASP`, where the gripper closes in `GRASP`.
+    `WAIT`, `LOOK` (from near, where the handle was not seen) and `PLAN` come before the plan. It
+    begins with `RELEASE` only if the hand is at the handle. `REACH` lasts up to `PhaseEnd.GRASP`,
+    where the gripper closes in `GRASP`.
     """
 
     WAIT = "wait"
+    LOOK = "look"
     PLAN = "plan"
     RELEASE = "release"
     REACH = "reach"

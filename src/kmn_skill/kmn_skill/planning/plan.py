@@ -1,4 +1,4 @@
-"""What is planned, and the plan: a trajectory of robot and door with its phases."""
+"""What is planned, and the plan: a trajectory of robot and object with its phases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class PlanningCancelled(Exception):  # noqa: N818
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """A door to be opened, from the present state of robot and door.
+    """An object to be opened, from the present state of robot and object.
 
     Attributes
     ----------
@@ -29,35 +29,36 @@ class PlanRequest:
         (n,) transformation and (m,) configuration parameters of the kinematic model.
     start
         (J,) present positions of the robot's joints, m and rad.
-    door_start
-        (2,) present angles of hinge and handle, radians.
-    handle_angle
-        Angle to which the handle is pressed, radians; negative as in the model.
-    door_angle
-        Angle to which the door is opened, radians: negative towards a robot before the door
-        (pull), positive away from it (push).
+    object_start
+        (2,) present positions of the object's joints, m and rad: of the one that is moved, and of
+        the one that unlatches it.
+    unlatched
+        Position of the latter at which it does, m or rad; 0 where there is none.
+    target
+        Position to which the object is opened, m or rad: negative towards a robot before it (pull),
+        positive away from it (push).
     obstacles
-        What stands around the door.
+        What stands around the object.
     """
 
     theta: NDArray[np.float64]
     gamma: NDArray[np.float64]
     start: NDArray[np.float64]
-    door_start: NDArray[np.float64]
-    handle_angle: float
-    door_angle: float
+    object_start: NDArray[np.float64]
+    unlatched: float
+    target: float
     obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def configuration(self) -> NDArray[np.float64]:
-        """(D,) where robot and door are, m and rad."""
-        return np.concatenate([self.start, self.door_start])
+        """(D,) where robot and object are, m and rad."""
+        return np.concatenate([self.start, self.object_start])
 
     def is_finite(self) -> bool:
         """Tell whether all numbers are finite."""
-        values = (self.theta, self.gamma, self.start, self.door_start)
-        angles = [self.handle_angle, self.door_angle]
-        return all(np.isfinite(value).all() for value in (*values, angles))
+        values = (self.theta, self.gamma, self.start, self.object_start)
+        targets = [self.unlatched, self.target]
+        return all(np.isfinite(value).all() for value in (*values, targets))
 
 
 class Phase(NamedTuple):
@@ -78,8 +79,8 @@ class PlanReport:
         Largest distance between points of gripper and handle that should coincide.
     clearance
         Smallest distance between what must not touch.
-    handle_angle, door_angle
-        To which the handle is pressed, and the door is opened at the end.
+    unlatched, opened
+        Positions to which the joints are moved: that which unlatches, and at the end the other one.
     duration
         Of the motion.
     planning_time
@@ -90,8 +91,8 @@ class PlanReport:
 
     contact_error: float
     clearance: float
-    handle_angle: float
-    door_angle: float
+    unlatched: float
+    opened: float
     duration: float
     planning_time: float
     seed_used: str
@@ -109,8 +110,8 @@ class Plan:
         (T,) seconds from the start.
     positions, velocities
         (T, J) of the robot's joints, m and rad, and per second.
-    door
-        (T, 2) angles of hinge and handle, radians.
+    object_joints
+        (T, 2) positions of the object's joints, m and rad.
     phases
         One after the other; each begins where the one before ends.
     report
@@ -121,7 +122,7 @@ class Plan:
     times: NDArray[np.float64]
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
-    door: NDArray[np.float64]
+    object_joints: NDArray[np.float64]
     phases: tuple[Phase, ...]
     report: PlanReport
 

@@ -11,13 +11,20 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
+import numpy as np
+from numpy.typing import NDArray
+
+from kmn_skill.planning.kinematic_chain import KinematicChain
+from kmn_skill.planning.look import furthest, look_plan
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanRequest
-from kmn_skill.planning.planning_process import READY, serve
+from kmn_skill.planning.planning_process import Ready, serve
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import Guess, Prototypes
 
 POLL_PERIOD = 0.02  # seconds
+TOLERANCE = 0.03  # metres, by which opening fingers may reach further
 STOP_TIMEOUT = 2.0  # seconds for the process to end
+NO_MOTION = "no motion is known that moves it to this side; make_prototypes makes them"
 
 
 class Planner:
@@ -53,6 +60,7 @@ class Planner:
         self._connection: Connection | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None  # where the process works
         self._loaded = False
+        self._chain: KinematicChain | None = None  # of the robot
         self.restarts = 0
 
     def __enter__(self) -> Planner:
@@ -66,6 +74,11 @@ class Planner:
     def pid(self) -> int | None:
         """Number of the process."""
         return None if self._process is None else self._process.pid
+
+    @property
+    def drives(self) -> bool:
+        """Whether the robot can drive to see the door from elsewhere."""
+        return not self._setup.robot.is_fixed
 
     def plan(self, request: PlanRequest, cancelled: Callable[[], bool] = lambda: False) -> Plan:
         """Return a plan that has passed the check.
@@ -101,7 +114,74 @@ class Planner:
                 passed = time.monotonic() - begin
                 return replace(answer, report=replace(answer.report, planning_time=passed))
             reasons.append(answer)
-        raise PlanningFailed("; ".join(dict.fromkeys(reasons)))
+        raise PlanningFailed("; ".join(dict.fromkeys(reasons)) or NO_MOTION)
+
+    def pads(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where the fingers touch (2, 3), world frame, at positions (J,) of the robot."""
+        poses = self.links(positions)
+        pads = self._setup.robot.planning.pads[:2]
+        points = [(poses[pad.joint] @ [*pad.point, 1.0])[:3] for pad in pads]
+        return np.array(points)
+
+    def look(
+        self,
+        values: NDArray[np.float64],
+        start: NDArray[np.float64],
+        place: NDArray[np.float64],
+        clearance: float,
+    ) -> Plan:
+        """Return the plan to drive to where the handle of a door can be seen from.
+
+        Parameters
+        ----------
+        values
+            (n + m,) parameters of the closed door.
+        start, place
+            (J,) present positions of the robot, and those from where it is seen.
+        clearance
+            By which the robot keeps before the door, as far as it does so now, metres.
+
+        Raises
+        ------
+        PlanningFailed
+            If it would come nearer, or does not drive.
+        """
+        if not self.drives:
+            raise PlanningFailed("the robot stands where it is: its base cannot drive elsewhere")
+        is_near = self.reach(values, start) > -clearance
+        back = abs(self._setup.settings.policy.pre_grasp) if is_near else 0.0
+        plan = look_plan(self._setup, values, start, place, back)
+        reach = [self.reach(values, each) for each in plan.positions]
+        if max(reach) > max(-clearance, reach[0] + TOLERANCE):
+            raise PlanningFailed(
+                f"to see the handle the robot would come within {-max(reach):.2f} m of the door, "
+                f"expected {clearance:g} m"
+            )
+        return plan
+
+    def reach(self, values: NDArray[np.float64], positions: NDArray[np.float64]) -> float:
+        """Return how far the robot at positions (J,) reaches into a door at most, metres.
+
+        Raises
+        ------
+        PlanningFailed
+            As `links`.
+        """
+        links = np.array(list(self.links(positions).values()))
+        return furthest(self._setup.model, self._setup.action.joint.body, values, links)
+
+    def links(self, positions: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return the poses (4, 4) of the robot's links in the world at positions (J,).
+
+        Raises
+        ------
+        PlanningFailed
+            If the process that knows the robot does not start.
+        """
+        if self._chain is None:
+            self._ready(lambda: False)
+        assert self._chain is not None
+        return self._chain.poses(positions)
 
     def _ready(self, cancelled: Callable[[], bool]) -> Connection:
         """Return the connection to a process that has loaded all it needs.
@@ -126,7 +206,10 @@ class Planner:
                 raise PlanningFailed("the planner's process does not start")
             try:
                 if self._connection.poll(POLL_PERIOD):
-                    self._loaded = self._connection.recv() == READY
+                    ready: Ready | str = self._connection.recv()
+                    if isinstance(ready, str):
+                        raise PlanningFailed(ready)
+                    self._chain, self._loaded = ready.chain, True
             except (EOFError, OSError):
                 raise PlanningFailed("the planner's process died while it started") from None
         return self._connection

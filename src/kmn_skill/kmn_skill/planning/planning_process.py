@@ -5,14 +5,21 @@ from __future__ import annotations
 import os
 import signal
 from multiprocessing.connection import Connection
+from typing import NamedTuple
 
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_skill.planning.kinematic_chain import KinematicChain
 from kmn_skill.planning.planning_setup import PlanningSetup
 
-READY = "ready"  # is sent when all is loaded
+
+class Ready(NamedTuple):
+    """Is sent when all is loaded."""
+
+    chain: KinematicChain
 
 
 def serve(connection: Connection, setup: PlanningSetup, folder: str) -> None:
-    """Say when ready, then answer each (request, guess) with a plan, or why there is none."""
+    """Say when ready, or why never; answer each (request, guess) with a plan, or why not."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
     os.chdir(folder)  # the package robotic writes a log where it is
     _silence()
@@ -21,10 +28,15 @@ def serve(connection: Connection, setup: PlanningSetup, folder: str) -> None:
 
 def _answer(connection: Connection, setup: PlanningSetup) -> None:
     from kmn_skill.planning.check import PlanRejected
+    from kmn_skill.planning.robot_chain import chain_of
     from kmn_skill.planning.solver import Solver
 
-    solver = Solver(setup)
-    connection.send(READY)
+    try:
+        solver, chain = Solver(setup), chain_of(setup.robot)
+    except ConfigurationError as error:  # of the robot's file, against its model
+        connection.send(str(error))
+        return
+    connection.send(Ready(chain))
     while True:
         try:
             request, guess = connection.recv()
@@ -32,7 +44,7 @@ def _answer(connection: Connection, setup: PlanningSetup) -> None:
             return
         try:
             connection.send(solver.plan(request, guess.solution, guess.name))
-        except PlanRejected as error:
+        except (PlanRejected, ConfigurationError) as error:
             connection.send(str(error))
         except RuntimeError as error:  # what the package robotic raises
             connection.send(f"the solver failed: {str(error).splitlines()[0]}")

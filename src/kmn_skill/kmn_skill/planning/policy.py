@@ -12,10 +12,20 @@ import numpy as np
 import robotic as ry
 from numpy.typing import ArrayLike, NDArray
 
-from kmn_skill.planning.layout import BASE_AND_ARM, DOOR, HANDLE, HINGE
+from kmn_skill.planning.layout import BASE, BASE_AND_ARM, LATCH, MOVED, OBJECT_JOINTS
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
-from kmn_skill.planning.world import CONTACTS, GRASP, OBJECT, PADS, TOOL, World, blunt, door_body
+from kmn_skill.planning.world import (
+    CONTACTS,
+    GRASP,
+    OBJECT,
+    PADS,
+    STANCE,
+    TOOL,
+    World,
+    blunt,
+    object_body,
+)
 
 COST, EQUAL, INEQUALITY = ry.OT.sos, ry.OT.eq, ry.OT.ineq
 
@@ -64,18 +74,20 @@ class Policy:
         self._add_inequalities(pairs)
 
     def _add_costs(self, request: PlanRequest) -> None:
-        """Smooth motion, base pose before the door, pre-grasp pose of the gripper."""
+        """Smooth motion, base pose before the object, pre-grasp pose of the gripper."""
         robot, settings, step = self._robot, self._settings, self._step
         # All but the gripper.
-        smooth = [*robot.model_joints[BASE_AND_ARM], *self._world.model_joints[DOOR]]
+        smooth = [*robot.model_joints[BASE_AND_ARM], *self._world.model_joints[OBJECT_JOINTS]]
         rate = np.sqrt(step)  # the sum over the steps is an integral over time
         self._add("acceleration", [], ry.FS.qItself, smooth, COST, scale=rate, order=2)
         gripper, opening = [robot.gripper.joint], [step, PhaseEnd.PRE_GRASP]
         self._add("acceleration", opening, ry.FS.qItself, gripper, COST, scale=rate, order=2)
 
-        base, place, along = [robot.base, GRASP], [*settings.base, 0.0], np.eye(3)[:2]
-        self._add("base", [PhaseEnd.GRASP], ry.FS.positionRel, base, COST, place, along)
-        self._add("base", [PhaseEnd.GRASP], ry.FS.scalarProductXY, [robot.base, OBJECT], COST)
+        base, stance = robot.base.frame, [*robot.planning.stance, 0.0]
+        self._add(
+            "base", [PhaseEnd.GRASP], ry.FS.positionRel, [base, STANCE], COST, stance, np.eye(3)[:2]
+        )
+        self._add("base", [PhaseEnd.GRASP], ry.FS.scalarProductXY, [base, OBJECT], COST)
 
         tool, before = [TOOL, GRASP], [settings.pre_grasp, 0.0, 0.0]
         self._add("pre_grasp", [PhaseEnd.PRE_GRASP], ry.FS.positionRel, tool, COST, before)
@@ -84,29 +96,37 @@ class Policy:
         self._add("heading", approach, ry.FS.scalarProductXX, tool, COST, [1.0])
 
     def _add_equalities(self, request: PlanRequest) -> None:
-        """Targets of handle and door, contact, and what is fixed when."""
+        """Targets of the object's joints, contact, and what is fixed when."""
         robot, step = self._robot, self._step
-        hinge, handle = ([name] for name in self._world.model_joints[DOOR])
+        joints = self._world.model_joints[OBJECT_JOINTS]
+        moved, latch = [joints[MOVED]], [joints[LATCH]]
         gripper, others = [robot.gripper.joint], list(robot.model_joints[BASE_AND_ARM])
-        hinge_start, handle_start = request.door_start[[HINGE, HANDLE]]
+        moved_start, latch_start = request.object_start[[MOVED, LATCH]]
         grasped, pulling = PhaseEnd.GRASP + step, PhaseEnd.PRESSED + step
+        clear = PhaseEnd.PRESSED + self._settings.pressed
 
-        pressed = [request.handle_angle]
-        self._add("target", [PhaseEnd.PRESSED], ry.FS.qItself, handle, EQUAL, pressed)
-        self._add("target", [PhaseEnd.OPEN], ry.FS.qItself, hinge, EQUAL, [request.door_angle])
+        pressed, relaxed = [request.unlatched], [self._settings.relaxed * request.unlatched]
+        self._add("target", [PhaseEnd.PRESSED], ry.FS.qItself, latch, EQUAL, pressed)
+        self._add("target", [PhaseEnd.OPEN], ry.FS.qItself, moved, EQUAL, [request.target])
+        # Where an object is not where it is believed, the hand slides along its lever: one that is
+        # still pressed would come to its stop, and be torn out of the hand.
+        self._add("target", [PhaseEnd.OPEN], ry.FS.qItself, latch, EQUAL, relaxed)
 
         for pad, contact in zip(PADS, CONTACTS, strict=True):
             times = [grasped, PhaseEnd.OPEN]
             self._add("contact", times, ry.FS.positionDiff, [pad, contact], EQUAL)
 
-        self._add("fixed", [step, PhaseEnd.PRESSED], ry.FS.qItself, hinge, EQUAL, [hinge_start])
-        self._add("fixed", [step, grasped], ry.FS.qItself, handle, EQUAL, [handle_start])
-        self._add("fixed", [pulling, PhaseEnd.OPEN], ry.FS.qItself, handle, EQUAL, pressed)
-        times, opened = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP], [self._settings.open_gripper]
+        self._add("fixed", [step, PhaseEnd.PRESSED], ry.FS.qItself, moved, EQUAL, [moved_start])
+        self._add("fixed", [step, grasped], ry.FS.qItself, latch, EQUAL, [latch_start])
+        self._add("fixed", [pulling, clear], ry.FS.qItself, latch, EQUAL, pressed)
+        times, opened = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP], [robot.planning.grip.open]
         self._add("fixed", times, ry.FS.qItself, gripper, EQUAL, opened)
+        if robot.is_fixed:
+            stands = request.start[BASE].tolist()
+            self._add("stand", [], ry.FS.qItself, [robot.base.frame], EQUAL, stands)
         self._add("rest", [grasped], ry.FS.qItself, others, EQUAL, order=1)
 
-        # Straight towards the handle, with one finger above and one below it.
+        # Straight towards what is grasped, with a finger to either side of it.
         times, tool = [PhaseEnd.PRE_GRASP, PhaseEnd.GRASP - step], [TOOL, GRASP]
         self._add("approach", times, ry.FS.positionRel, tool, EQUAL, [0.0] * 3, np.eye(3)[1:])
         self._add("approach", times, ry.FS.scalarProductYX, tool, EQUAL)
@@ -139,16 +159,18 @@ class Policy:
 
 def pairs(world: World) -> list[Pair]:
     """Return all pairs of bodies that must not touch."""
-    settings = world.setup.settings.policy
-    panel, handle = (door_body(name) for name in world.door_bodies)
-    door = [(body, panel) for body in settings.door_collisions]
-    door += [(body, handle) for body in settings.handle_collisions]
-    around = [*settings.obstacle_collisions, *map(blunt, settings.blunt_collisions)]
-    door += [(body, name) for name in world.obstacle_names for body in around]
-    own = [(body, other) for body, others in settings.self_collisions.items() for other in others]
-    always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*door, *own)]
+    avoided = world.setup.robot.planning.collisions
+    grasped = world.setup.action.grasp.body
+    others = [object_body(b.name) for b in world.setup.model.bodies if b.name != grasped.name]
+    handle = object_body(grasped.name)
+    object_pairs = [(body, other) for body in avoided.door for other in others]
+    object_pairs += [(body, handle) for body in avoided.handle]
+    around = [*avoided.obstacles, *map(blunt, avoided.blunt)]
+    object_pairs += [(body, name) for name in world.obstacle_names for body in around]
+    own = [(body, other) for body, others in avoided.own.items() for other in others]
+    always = [Pair(*names, 0.0, float(PHASE_COUNT)) for names in (*object_pairs, *own)]
     before = float(PhaseEnd.PRE_GRASP)
-    return always + [Pair(body, handle, 0.0, before) for body in settings.approach_collisions]
+    return always + [Pair(body, handle, 0.0, before) for body in avoided.approach]
 
 
 def near_pairs(

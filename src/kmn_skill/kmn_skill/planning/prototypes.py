@@ -1,6 +1,7 @@
-"""Solutions for some doors, from which plans for other doors start.
+"""Solutions for some objects, from which plans for others start.
 
-Made by ``make_prototypes`` and kept in ``config/skill/prototypes.json``.
+Made by ``make_prototypes`` and kept in ``config/skill/prototypes``: of each robot a folder with a
+file for each kind of motion.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_skill.planning.layout import BASE_AND_ARM, ROBOT
 from kmn_skill.planning.plan import PlanRequest
+from kmn_skill.planning.robot import default_robot
 
 PULL, PUSH = "pull", "push"
 PUSH_IN_WALL = "push_in_wall"  # where the robot cannot stand beside the opening
@@ -27,7 +29,7 @@ SOLUTIONS = (PULL, PUSH, PUSH_IN_WALL)
 
 
 class Solution(NamedTuple):
-    """A solution: of which door, gamma (m,), and its coarse path (T + 1, D) with its start."""
+    """A solution: of which object, gamma (m,), and its coarse path (T + 1, D) with its start."""
 
     gamma: NDArray[np.float64]
     path: NDArray[np.float64]
@@ -42,26 +44,51 @@ class Guess(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Prototypes:
-    """Solutions for the prototype, and for some doors in a wall.
+    """Solutions for the prototype, and for some that stand in a wall.
 
     Attributes
     ----------
     joints
         (D,) names of the columns: joints of the robot, then of the kinematic model.
     solutions
-        For a door to pull, one to push, and some to push that stand in a wall; m and rad.
+        By `SOLUTIONS`: to pull, to push, and to push what stands in a wall; m and rad. Some
+        objects can be pulled only.
     """
 
     joints: tuple[str, ...]
     solutions: dict[str, list[Solution]]
 
     @classmethod
-    def load(cls, name_or_path: str | Path = "prototypes") -> Prototypes:
-        """Read ``config/skill/NAME.json`` or the user's own file."""
-        file = resources.find("config/skill", name_or_path, ".json")
-        stored = json.loads(file.read_text(encoding="utf-8"))
+    def load(cls, motions: str, robot: str | Path = "") -> Prototypes:
+        """Read those of a kind of motion.
+
+        Parameters
+        ----------
+        motions
+            As an object's action names them: a file, or a name.
+        robot
+            As `RobotModel.load` takes it, skill_node's where none is told. Motions of a name are in
+            ``config/skill/prototypes/ROBOT/NAME.json``, or in a folder beside the user's own file
+            of the robot, whose name the folder has without the ending.
+
+        Raises
+        ------
+        FileNotFoundError
+            If they have not been made.
+        """
+        name = Path(robot or default_robot())
+        file: str | Path = name.with_suffix("") / f"{motions}.json"
+        if Path(motions).suffix:
+            file = motions
+        elif not name.suffix:
+            file = f"{name}/{motions}"
+        try:
+            found = resources.find("config/skill/prototypes", file, ".json")
+        except FileNotFoundError as error:
+            raise FileNotFoundError(f"{error}: make_prototypes makes a robot's motions") from error
+        stored = json.loads(found.read_text(encoding="utf-8"))
         solutions = {
-            name: [Solution(*map(np.array, solution)) for solution in stored[name]]
+            name: [Solution(*map(np.array, solution)) for solution in stored.get(name, ())]
             for name in SOLUTIONS
         }
         return cls(tuple(stored["joints"]), solutions)
@@ -94,9 +121,11 @@ class Prototypes:
         spread
             Standard deviation of base and arm from the solution, m and rad.
         """
-        name = direction(request.door_angle)
+        name = direction(request.target)
         if name == PUSH and request.obstacles:
             name = PUSH_IN_WALL
+        if not self.solutions[name]:
+            return
         nearest = sorted(
             self.solutions[name],
             key=lambda known: float(np.linalg.norm(known.gamma - request.gamma)),
@@ -111,6 +140,6 @@ class Prototypes:
             yield Guess(f"{name}, varied {number}", Solution(gamma, varied))
 
 
-def direction(door_angle: float) -> str:
-    """Return which way a door opens, of a robot before it, by the sign of its angle."""
-    return PULL if door_angle < 0.0 else PUSH
+def direction(target: float) -> str:
+    """Return which way an object opens, of a robot before it, by the sign of its target."""
+    return PULL if target < 0.0 else PUSH

@@ -11,9 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.node_parameters import load_node_parameters
+from kmn_perception.configuration.robot_parts import (
+    BaseSettings,
+    ControllerSettings,
+    Gripper,
+    controllers_fault,
+    joints_in_messages,
+    velocity_controller,
+)
 from kmn_perception.configuration.section import Section
 from kmn_perception.configuration.settings import NonNegative, Positive, read_settings
 from kmn_skill.planning.layout import BASE
+
+Names = tuple[str, ...]
+SIMULATED = ("notice", "camera", "simulation")  # what only the simulator reads
 
 
 class RobotJoint(NamedTuple):
@@ -33,13 +45,6 @@ class RobotJoint(NamedTuple):
     effort: Positive
     velocity: Positive
     planned: tuple[Positive, Positive]
-
-
-class Gripper(NamedTuple):
-    """The gripper's joint, and the joints that turn with it."""
-
-    joint: str
-    followers: tuple[str, ...]
 
 
 class RobotBody(NamedTuple):
@@ -69,10 +74,46 @@ class Pad(NamedTuple):
 
 
 class Pads(NamedTuple):
-    """Those of the two fingers."""
+    """Those of the two fingers, and whereto they reach in the frame of the left one's joint."""
 
     left: Pad
     right: Pad
+    forwards: tuple[float, float, float]
+
+
+class Grip(NamedTuple):
+    """Positions of the gripper, m or rad: before the grasp, and by how much beyond contact."""
+
+    open: NonNegative
+    squeeze: NonNegative
+
+
+class Collisions(NamedTuple):
+    """Names of bodies that must not touch what the robot opens and passes.
+
+    Attributes
+    ----------
+    door, handle, approach
+        Must not touch the panel, the handle, and the handle before the grasp.
+    obstacles
+        Must not touch what stands around the door.
+    blunt
+        Thick ones, which must not do so with edges as round as can be either.
+    own
+        Bodies of the arm, and those that each of them must not touch.
+    """
+
+    door: Names
+    handle: Names
+    approach: Names
+    obstacles: Names
+    blunt: Names
+    own: dict[str, Names]
+
+    def names(self) -> set[str]:
+        """Return all names."""
+        own = {name for names in self.own.values() for name in names}
+        return own.union(self.own, *self[:-1])
 
 
 class RobotShape(NamedTuple):
@@ -84,6 +125,8 @@ class RobotShape(NamedTuple):
         Radius of the corners of the boxes about the bodies, metres.
     bodies
         By name.
+    stance
+        Where the base best stands, metres from the grasp along x and y of the object frame.
     fingers, moving, obstacles
         Names of bodies: fingers may touch what they hold; moving ones, of the arm, must keep
         clear of the robot's own obstacles.
@@ -92,9 +135,17 @@ class RobotShape(NamedTuple):
     rounding: NonNegative
     bodies: dict[str, RobotBody]
     pads: Pads
-    fingers: tuple[str, ...]
-    moving: tuple[str, ...]
-    obstacles: tuple[str, ...]
+    grip: Grip
+    stance: tuple[float, float]
+    fingers: Names
+    moving: Names
+    obstacles: Names
+    collisions: Collisions
+
+
+def default_robot() -> str:
+    """Return the robot that skill_node has where none is told."""
+    return str(load_node_parameters("skill_node")["robot"].default)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,22 +156,26 @@ class RobotModel:
     ----------
     source
         The model's file in the folder of robotic's models.
-    base
-        The model's joint of x, y and yaw.
     joints
         By name, in the order of ``joint_states``: base x, y, yaw, arm, gripper.
+    continuous
+        Names of joints of which a whole turn changes nothing.
+    controllers
+        By name; each joint has one.
     """
 
     name: str
     source: str
-    base: str
+    base: BaseSettings
     joints: dict[str, RobotJoint]
+    continuous: tuple[str, ...]
+    controllers: dict[str, ControllerSettings]
     gripper: Gripper
     planning: RobotShape
 
     @classmethod
-    def load(cls, name_or_path: str | Path) -> RobotModel:
-        """Read ``config/robots/NAME.yaml`` or the user's own file.
+    def load(cls, name_or_path: str | Path = "") -> RobotModel:
+        """Read ``config/robots/NAME.yaml`` or the user's own file; skill_node's where none is told.
 
         Raises
         ------
@@ -129,20 +184,47 @@ class RobotModel:
         ConfigurationError
             If a key is missing, unknown or wrong, or the joints do not end with the gripper's.
         """
-        section = Section.load(resources.find("config/robots", name_or_path))
-        # What only the simulator reads.
-        own = {key: value for key, value in section.values.items() if key != "simulation"}
+        section = Section.load(resources.find("config/robots", name_or_path or default_robot()))
+        own = {key: value for key, value in section.values.items() if key not in SIMULATED}
         robot = read_settings(cls, Section(own, section.place))
-        if robot.joint_names[-1] != robot.gripper.joint:
+        robot._check(section)
+        return robot
+
+    def _check(self, section: Section) -> None:
+        """Raise `ConfigurationError` if joints or bodies are named that there are not."""
+        base, limited = self.joint_names[BASE], tuple(self.base.limits)
+        if limited != base:
             raise section.error(
-                f"the last joint must be the gripper's, '{robot.gripper.joint}', "
-                f"found '{robot.joint_names[-1]}'"
+                f"base: 'limits' must be of the first joints, {', '.join(base)}, "
+                f"found {', '.join(limited)}"
             )
-        shape = robot.planning
-        for name in (*shape.fingers, *shape.moving, *shape.obstacles):
+        if self.joint_names[-1] != self.gripper.joint:
+            raise section.error(
+                f"the last joint must be the gripper's, '{self.gripper.joint}', "
+                f"found '{self.joint_names[-1]}'"
+            )
+        for name in self.continuous:
+            if name not in self.joints:
+                raise section.error(f"continuous: there is no joint '{name}'")
+        fault = controllers_fault(
+            self.controllers, self.joints, base, self.gripper.joint, self.is_fixed
+        )
+        if fault:
+            raise section.error(fault)
+        if self.takes_velocities and base[-1] not in self.continuous:
+            raise section.error(
+                f"continuous: must name '{base[-1]}', which odometry tells within one turn"
+            )
+        shape = self.planning
+        for name in (*shape.fingers, *shape.moving, *shape.obstacles, *shape.collisions.names()):
             if name not in shape.bodies:
                 raise section.error(f"planning: there is no body '{name}'")
-        return robot
+        moving = (*self.model_joints, *self.gripper.followers)
+        carriers = {f"bodies: {name}": body.joint for name, body in shape.bodies.items()}
+        carriers |= {"pads: left": shape.pads.left.joint, "pads: right": shape.pads.right.joint}
+        for what, joint in carriers.items():
+            if joint not in moving:
+                raise section.error(f"planning: {what}: there is no joint '{joint}'")
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -150,14 +232,37 @@ class RobotModel:
         return tuple(self.joints)
 
     @property
+    def told_names(self) -> tuple[str, ...]:
+        """Names of the joints that trajectories and ``joint_states`` are of."""
+        return joints_in_messages(self.joints, self.controllers)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the base stands where it is, which transforms tell."""
+        return self.base.kind == "fixed"
+
+    @property
+    def takes_velocities(self) -> bool:
+        """Whether the base is moved by velocities, and odometry tells where it is."""
+        return bool(velocity_controller(self.controllers))
+
+    @property
     def model_joints(self) -> tuple[str, ...]:
         """Names of the joints in the model, which has one for the base."""
-        return (self.base, *self.joint_names[BASE.stop :])
+        return (self.base.frame, *self.joint_names[BASE.stop :])
 
     @property
     def home(self) -> NDArray[np.float64]:
         """(J,) positions at which the robot starts, m and rad."""
         return np.array([joint.home for joint in self.joints.values()])
+
+    def whole_turns(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the turns (J,) that lead from positions (J,) to those nearest to 0, radians.
+
+        Of joints that turn on and on; 0 for others.
+        """
+        turns = -2.0 * np.pi * np.round(positions / (2.0 * np.pi))
+        return np.where(np.isin(self.joint_names, self.continuous), turns, 0.0)
 
     @property
     def limits(self) -> NDArray[np.float64]:

@@ -1,36 +1,22 @@
-"""Numbers of the skill, read from ``config/skill/door.yaml``."""
+"""Numbers of the skill, read from ``config/skill/policy.yaml``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.settings import Count, NonNegative, Positive, load_settings
+from kmn_perception.configuration.settings import (
+    Count,
+    Fraction,
+    NonNegative,
+    Positive,
+    load_settings,
+)
 from kmn_skill.planning.surroundings import SurroundingsSettings
-
-Names = tuple[str, ...]
-
-
-class GraspSettings(NamedTuple):
-    """Where the handle is grasped.
-
-    Attributes
-    ----------
-    body
-        Body of the kinematic model.
-    offset
-        From the body's centre, metres in the object frame.
-    axis
-        Along which the two points lie on the body's surface.
-    """
-
-    body: str
-    offset: tuple[float, float, float]
-    axis: Literal["x", "y", "z"]
 
 
 class PolicySettings(NamedTuple):
@@ -38,37 +24,22 @@ class PolicySettings(NamedTuple):
 
     Attributes
     ----------
-    base
-        Place of the base from the grasp, metres along x and y of the object frame.
     pre_grasp
-        Place of the gripper before the handle, metres from the grasp along x.
-    open_gripper
-        Gripper's position before the grasp, radians.
+        Place of the gripper before what it grasps, metres from the grasp along x.
     margin
         Distance between what must not touch, metres.
+    pressed, relaxed
+        Part of the last phase in which a latch stays pressed, and the part of its way that is left
+        at the end.
     weights
         Of the features, by name.
-    door_collisions, handle_collisions, approach_collisions
-        Bodies of the robot that must not touch panel or handle, the last ones before the handle.
-    obstacle_collisions
-        Bodies of the robot that must not touch what stands around the door.
-    blunt_collisions
-        Bodies that are thick, and must not do so with edges as round as can be either.
-    self_collisions
-        Bodies of the arm, and those that each of them must not touch.
     """
 
-    base: tuple[float, float]
     pre_grasp: float
-    open_gripper: NonNegative
     margin: NonNegative
+    pressed: Fraction
+    relaxed: Fraction
     weights: dict[str, NonNegative]
-    door_collisions: Names
-    handle_collisions: Names
-    approach_collisions: Names
-    obstacle_collisions: Names
-    blunt_collisions: Names
-    self_collisions: dict[str, Names]
 
 
 class PlannerSettings(NamedTuple):
@@ -109,17 +80,26 @@ class TimingSettings(NamedTuple):
 
     Attributes
     ----------
-    min_step
-        Shortest time between two configurations, seconds.
+    step
+        Longest time between two waypoints of a motion, seconds.
+    smoothing
+        In which an acceleration changes from one limit to the other at the fastest, seconds.
+    approach_speed, held_speed
+        Largest speed of the hand near the handle, and while it holds it, m/s.
+    moved_speed, latch_speed
+        Largest speeds of the object's joint that is moved, and of the one that unlatches it, rad/s
+        or m/s.
     dwell
-        In which the gripper closes, seconds.
-    squeeze
-        By which the gripper is sent beyond contact, radians.
+        In which the gripper closes, at least, seconds.
     """
 
-    min_step: Positive
+    step: Positive
+    smoothing: Positive
+    approach_speed: Positive
+    held_speed: Positive
+    moved_speed: Positive
+    latch_speed: Positive
     dwell: Positive
-    squeeze: NonNegative
 
 
 class CheckSettings(NamedTuple):
@@ -129,6 +109,10 @@ class CheckSettings(NamedTuple):
     ----------
     contact, clearance, angle, start
         Largest contact error, smallest clearance, and tolerances of targets and start.
+    unlatched
+        How far an object is open at least before its latch is let up.
+    duration
+        Of the longest motion.
     samples
         Looked at between two configurations.
     spacing
@@ -138,7 +122,9 @@ class CheckSettings(NamedTuple):
     contact: NonNegative
     clearance: NonNegative
     angle: NonNegative
+    unlatched: NonNegative
     start: NonNegative
+    duration: Positive
     samples: Annotated[Count, Field(le=20)]
     spacing: Annotated[float, Field(ge=1e-3, le=0.1)]
 
@@ -149,25 +135,24 @@ class SkillSettings:
 
     Attributes
     ----------
-    robot
-        The robot that the policy is for: a name in ``config/robots``.
     solver
         Options of the augmented Lagrangian, by their names.
+    coarse_solver
+        Those that differ for the first solution.
     surroundings
-        The wall around the door, where there is one.
+        The wall around a door, where there is one.
     """
 
-    robot: str
-    grasp: GraspSettings
     policy: PolicySettings
     planner: PlannerSettings
     solver: dict[str, int | float]
+    coarse_solver: dict[str, int | float]
     timing: TimingSettings
     check: CheckSettings
     surroundings: SurroundingsSettings
 
     @classmethod
-    def load(cls, name_or_path: str | Path = "door") -> SkillSettings:
+    def load(cls, name_or_path: str | Path = "policy") -> SkillSettings:
         """Read ``config/skill/NAME.yaml`` or the user's own file.
 
         Raises

@@ -11,12 +11,15 @@ import robotic as ry
 from numpy.typing import NDArray
 
 from kmn_skill.planning.check import PlanRejected, check
-from kmn_skill.planning.layout import DOOR, ROBOT
+from kmn_skill.planning.layout import BASE, OBJECT_JOINTS, ROBOT
+from kmn_skill.planning.motion import MotionError
 from kmn_skill.planning.plan import Plan, PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.policy import Policy, near_pairs, pairs
 from kmn_skill.planning.prototypes import Solution
+from kmn_skill.planning.reach import check_reach
 from kmn_skill.planning.release import release
+from kmn_skill.planning.robot_frames import surfaces
 from kmn_skill.planning.timing import preceded, timed_plan
 from kmn_skill.planning.transfer import refine, transfer
 from kmn_skill.planning.world import World
@@ -28,18 +31,22 @@ class Solver:
     def __init__(self, setup: PlanningSetup) -> None:
         self._setup = setup
         World(setup, *setup.model.split(setup.model.prototype))
+        surfaces(setup.robot, setup.settings.check.spacing)
 
     def world(self, request: PlanRequest) -> World:
-        """Return the world of a request's door and of what stands around it."""
+        """Return the world of a request's object and of what stands around it."""
         return World(self._setup, request.theta, request.gamma, request.obstacles)
 
     def plan(self, request: PlanRequest, guess: Solution, name: str) -> Plan:
         """Return a plan that passes the check.
 
+        A robot that has turned a joint further than half around is planned for as if it had not:
+        the solver knows a configuration by its bodies' poses, hence angles within a turn only.
+
         Parameters
         ----------
         guess
-            Solution for another door, to be transferred.
+            Solution for another object, to be transferred.
         name
             Of the guess.
 
@@ -48,16 +55,26 @@ class Solver:
         PlanRejected
             If the solution does not pass.
         """
-        model, robot, settings = self._setup.model, self._setup.robot, self._setup.settings
+        robot, settings = self._setup.robot, self._setup.settings
+        turns = robot.whole_turns(request.start)
+        request = replace(request, start=request.start + turns)
         world = self.world(request)
+        if robot.is_fixed:
+            check_reach(world, request)
         first = np.vstack([request.configuration, release(world, request, settings)])
-        begin = replace(request, start=first[-1, ROBOT], door_start=first[-1, DOOR])
-        path = self._solve(world, begin, transfer(guess, model, begin))
-        plan = timed_plan(path, begin, robot, settings.timing)
-        if len(first) > 1:
-            plan = preceded(plan, first, robot, settings.timing)
+        begin = replace(request, start=first[-1, ROBOT], object_start=first[-1, OBJECT_JOINTS])
+        guessed = transfer(guess, self._setup.model, self._setup.action, begin)
+        path = self._solve(world, begin, self._standing(guessed, begin))
+        path = self._standing(path, begin)  # exactly
+        try:
+            plan = timed_plan(path, begin, world)
+            if len(first) > 1:
+                plan = preceded(plan, first, world)
+        except MotionError as error:
+            raise PlanRejected(str(error)) from error
         plan = replace(plan, report=replace(plan.report, seed_used=name))
-        return replace(plan, report=check(plan, request, world))
+        report = check(plan, request, world)
+        return replace(plan, positions=plan.positions - turns, report=report)
 
     def coarse(
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
@@ -71,7 +88,8 @@ class Solver:
         """
         settings = self._setup.settings
         policy = Policy(world, request, settings.planner.coarse, pairs(world))
-        path, violation = optimise(policy.problem, self._disturbed(guess), settings.solver)
+        options = {**settings.solver, **settings.coarse_solver}
+        path, violation = optimise(policy.problem, self._disturbed(guess), options)
         if violation > settings.planner.violation:
             raise PlanRejected("no motion was found that fulfils all constraints")
         return path
@@ -86,6 +104,14 @@ class Solver:
         policy = Policy(world, request, slices, around)
         finer = refine(self._disturbed(path), request.configuration, slices)
         return optimise(policy.problem, finer, settings.solver)[0]
+
+    def _standing(self, path: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
+        """Return a path (T, D) on which a base that is fixed stands where it starts."""
+        if not self._setup.robot.is_fixed:
+            return path
+        standing = path.copy()
+        standing[:, BASE] = request.start[BASE]
+        return standing
 
     def _disturbed(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add some noise (m and rad) to a coarse path (T, D), the same each time.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration.settings import NonNegative, Positive
-from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.parts import Body
 
 WALL = "wall"
 
@@ -26,8 +26,6 @@ class SurroundingsSettings(NamedTuple):
 
     Attributes
     ----------
-    panel
-        Body of the kinematic model that fills the opening.
     gap
         Between panel and frame.
     frame_proud
@@ -36,7 +34,6 @@ class SurroundingsSettings(NamedTuple):
         Of the wall beside the opening, from the floor, and from front to back.
     """
 
-    panel: str
     gap: NonNegative
     frame_proud: NonNegative
     width: Positive
@@ -45,7 +42,7 @@ class SurroundingsSettings(NamedTuple):
 
 
 def wall_around(
-    model: KinematicModel,
+    panel: Body,
     gamma: NDArray[np.float64],
     recess: float,
     settings: SurroundingsSettings,
@@ -54,12 +51,13 @@ def wall_around(
 
     Parameters
     ----------
+    panel
+        That fills the opening.
     gamma
         (m,) configuration parameters.
     recess
         Of the panel's front behind the wall's face, metres.
     """
-    panel = model.body(settings.panel)
     centre, size = panel.centre(gamma), panel.size(gamma)
     front = centre[0] - size[0] / 2.0 - recess - settings.frame_proud
     depth = settings.frame_proud + settings.thickness

@@ -1,100 +1,176 @@
-"""Time parametrisation: a path becomes a plan that keeps the robot's velocities."""
+"""Time parametrisation: a path becomes a plan at the limits of robot, hand and object."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_skill.planning.layout import DOOR, GRIPPER, ROBOT
+from kmn_skill.planning.layout import GRIPPER, OBJECT_JOINTS, ROBOT
+from kmn_skill.planning.motion import Motion
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd, PhaseName
 from kmn_skill.planning.plan import Phase, Plan, PlanReport, PlanRequest
-from kmn_skill.planning.robot import RobotModel
-from kmn_skill.planning.settings import TimingSettings
+from kmn_skill.planning.world import GRASP, TOOL, World
 
 UNCHECKED = PlanReport(np.inf, -np.inf, np.nan, np.nan, np.nan, np.nan, "")
 
 
-def timed_plan(
-    path: NDArray[np.float64], request: PlanRequest, robot: RobotModel, settings: TimingSettings
-) -> Plan:
+class Stretch(NamedTuple):
+    """A motion of robot and object from rest to rest.
+
+    Attributes
+    ----------
+    times
+        (P,) seconds from its start.
+    positions, velocities
+        (P, J) of the robot's joints, m and rad, and per second.
+    object_joints
+        (P, 2) positions of the object's joints, m and rad.
+    motion
+        Of which they are samples.
+    slowed
+        By how much the motion was slowed down.
+    """
+
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    object_joints: NDArray[np.float64]
+    motion: Motion
+    slowed: float
+
+    def waypoint(self, node: int) -> int:
+        """Return the first waypoint at which a node of the path was passed."""
+        return int(np.searchsorted(self.times, self.slowed * self.motion.time_of(node)))
+
+
+def timed_plan(path: NDArray[np.float64], request: PlanRequest, world: World) -> Plan:
     """Return the plan that follows a path; it is not checked yet.
 
-    Up to the handle, and from there, the steps have equal times. Between the two the robot rests
-    while the gripper closes; from then on it squeezes, for the handle stops the fingers.
+    Up to the handle, and from there, it stops nowhere. Between the two the robot rests while the
+    gripper closes; from then on it squeezes, for the handle stops the fingers.
 
     Parameters
     ----------
     path
         (T, D) positions after the start.
+
+    Raises
+    ------
+    MotionError
+        If the path cannot be followed.
     """
+    settings, slices = world.setup.settings.timing, len(path) // PHASE_COUNT
+    grasp = PhaseEnd.GRASP * slices
     nodes = np.vstack([request.configuration, path])
-    slices = len(path) // PHASE_COUNT
-    grasp, pressed, end = PhaseEnd.GRASP * slices, PhaseEnd.PRESSED * slices, len(path)
-    positions, limits = nodes[:, ROBOT].copy(), robot.limits
-    times, velocities = np.zeros(len(nodes)), np.zeros_like(positions)
-    times[: grasp + 1], velocities[: grasp + 1] = _paced(
-        positions[: grasp + 1], limits, settings.min_step
-    )
-    after, rates = _paced(positions[grasp + 1 :], limits, settings.min_step)
-    times[grasp + 1 :] = times[grasp] + settings.dwell + after
-    velocities[grasp + 1 :] = rates
-    held = positions[grasp + 1 :, GRIPPER]
-    held[:] = np.maximum(held - settings.squeeze, 0.0)
-    velocities[grasp + 1 :, GRIPPER] = 0.0
+    reach = _stretch(nodes[: grasp + 1], world, settings.approach_speed)
+    held = _stretch(nodes[grasp + 1 :], world, settings.held_speed)
+    grip = held.positions[:, GRIPPER]
+    grip[:] = np.maximum(grip - world.setup.robot.planning.grip.squeeze, 0.0)
+    held.velocities[:, GRIPPER] = 0.0
+    dwell = max(settings.dwell, _least_time(reach.positions[-1], held.positions[0], world))
+    closed = len(reach.times)
+    pressed = closed + held.waypoint(PhaseEnd.PRESSED * slices - grasp - 1)
     phases = (
-        Phase(PhaseName.REACH, 0, grasp),
-        Phase(PhaseName.GRASP, grasp, grasp + 1),
-        Phase(PhaseName.PRESS, grasp + 1, pressed),
-        Phase(PhaseName.OPEN, pressed, end),
+        Phase(PhaseName.REACH, 0, closed - 1),
+        Phase(PhaseName.GRASP, closed - 1, closed),
+        Phase(PhaseName.PRESS, closed, pressed),
+        Phase(PhaseName.OPEN, pressed, closed + len(held.times) - 1),
     )
-    door = nodes[:, DOOR].copy()
-    return Plan(robot.joint_names, times, positions, velocities, door, phases, UNCHECKED)
+    return Plan(
+        world.setup.robot.joint_names,
+        np.concatenate([reach.times, reach.times[-1] + dwell + held.times]),
+        np.vstack([reach.positions, held.positions]),
+        np.vstack([reach.velocities, held.velocities]),
+        np.vstack([reach.object_joints, held.object_joints]),
+        phases,
+        UNCHECKED,
+    )
 
 
-def preceded(
-    plan: Plan, path: NDArray[np.float64], robot: RobotModel, settings: TimingSettings
-) -> Plan:
+def preceded(plan: Plan, path: NDArray[np.float64], world: World) -> Plan:
     """Return a plan that first lets go of the handle.
 
     Parameters
     ----------
     path
-        (R + 1, D) positions, with the start, up to where the plan begins.
+        (R + 1, D) positions, with the start, up to where the plan begins: in its first half the
+        gripper opens, in the other one the hand draws back.
+
+    Raises
+    ------
+    MotionError
+        If the path cannot be followed.
     """
-    times, velocities = _paced(path[:, ROBOT], robot.limits, settings.min_step)
-    count = len(path) - 1
+    speed, opened = world.setup.settings.timing.approach_speed, (len(path) - 1) // 2
+    opening = _stretch(path[: opened + 1], world, speed)
+    leaving = _stretch(path[opened:], world, speed)
+    count = len(opening.times) + len(leaving.times) - 2
     phases = [Phase(name, first + count, last + count) for name, first, last in plan.phases]
+    left = opening.times[-1] + leaving.times
     return replace(
         plan,
-        times=np.concatenate([times, times[-1] + plan.times[1:]]),
-        positions=np.vstack([path[:, ROBOT], plan.positions[1:]]),
-        velocities=np.vstack([velocities, plan.velocities[1:]]),
-        door=np.vstack([path[:, DOOR], plan.door[1:]]),
+        times=np.concatenate([opening.times, left[1:], left[-1] + plan.times[1:]]),
+        positions=np.vstack([opening.positions, leaving.positions[1:], plan.positions[1:]]),
+        velocities=np.vstack([opening.velocities, leaving.velocities[1:], plan.velocities[1:]]),
+        object_joints=np.vstack(
+            [opening.object_joints, leaving.object_joints[1:], plan.object_joints[1:]]
+        ),
         phases=(Phase(PhaseName.RELEASE, 0, count), *phases),
     )
 
 
-def _paced(
-    nodes: NDArray[np.float64], limits: NDArray[np.float64], min_step: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times (M,) and velocities (M, J) through nodes (M, J), from rest to rest.
+def _stretch(nodes: NDArray[np.float64], world: World, near_speed: float) -> Stretch:
+    """Follow nodes (M, D) from rest to rest, at the limits of joints, hand and object.
 
     Parameters
     ----------
-    limits
-        (J, 2) largest velocities and accelerations.
+    near_speed
+        Largest speed of the hand where it is near the handle, m/s.
     """
-    rates: NDArray[np.float64] = np.gradient(nodes, axis=0)
-    rates[[0, -1]] = 0.0
-    fastest, sharpest = peaks(nodes, rates, np.ones(len(nodes) - 1))
-    step = max(
-        min_step,
-        float((fastest / limits[:, 0]).max()),
-        float(np.sqrt(sharpest / limits[:, 1]).max()),
+    settings, limits = world.setup.settings.timing, world.setup.robot.limits
+    places = world.poses(nodes, [TOOL, GRASP])[..., :3, 3]
+    way = np.linalg.norm(np.diff(places[:, 0], axis=0), axis=1)
+    hand = np.concatenate([[0.0], np.cumsum(way)])
+    near = near_the_handle(places, world)
+    speeds = np.full((len(nodes), nodes.shape[1] + 1), np.inf)
+    speeds[:, :-1][:, ROBOT] = limits[:, 0]
+    speeds[:, :-1][:, OBJECT_JOINTS] = settings.moved_speed, settings.latch_speed
+    speeds[near, -1] = near_speed
+    accelerations = np.concatenate([limits[:, 1], np.full(3, np.inf)])
+    motion = Motion(np.column_stack([nodes, hand]), speeds, accelerations, settings.smoothing)
+    count = int(np.ceil(motion.duration / settings.step))
+    times = np.linspace(0.0, motion.duration, count + 1, dtype=np.float64)
+    positions, velocities = motion.positions(times)[:, :-1], motion.velocities(times)[:, :-1]
+    # A spline may leave the limits that its nodes keep. The start is as measured, maybe beyond.
+    positions[1:] = np.clip(positions[1:], *world.limits())
+    robot, rates = positions[:, ROBOT], velocities[:, ROBOT]
+    fastest, sharpest = peaks(robot, rates, np.diff(times))
+    # Between waypoints the controller's cubic splines differ a little from the motion.
+    slowed = max(1.0, (fastest / limits[:, 0]).max(), np.sqrt((sharpest / limits[:, 1]).max()))
+    return Stretch(
+        slowed * times, robot, rates / slowed, positions[:, OBJECT_JOINTS], motion, slowed
     )
-    return step * np.arange(len(nodes), dtype=np.float64), rates / step
+
+
+def _least_time(start: NDArray[np.float64], end: NDArray[np.float64], world: World) -> float:
+    """Return the time of a cubic motion of the joints (J,) from rest to rest, seconds."""
+    way, limits = np.abs(end - start), world.setup.robot.limits
+    return float(np.maximum(1.5 * way / limits[:, 0], np.sqrt(6.0 * way / limits[:, 1])).max())
+
+
+def near_the_handle(places: NDArray[np.float64], world: World) -> NDArray[np.bool_]:
+    """Tell where (N,) the hand is not further from the grasp than before it.
+
+    Parameters
+    ----------
+    places
+        (N, 2, 3) of the hand, and of where it grasps the handle, metres.
+    """
+    distance = np.linalg.norm(places[:, 0] - places[:, 1], axis=1)
+    return distance <= abs(world.setup.settings.policy.pre_grasp)
 
 
 def peaks(

@@ -1,46 +1,46 @@
-"""Transfer of a solution for one door to another, as the first guess of the policy's solution."""
+"""Transfer of a solution for one object to another, as the first guess of the policy's solution."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.transformation import rotation_z
-from kmn_skill.planning.kinematics import turn
-from kmn_skill.planning.layout import BASE, DOOR, HANDLE, HINGE, ROBOT
+from kmn_skill.planning.layout import BASE, LATCH, MOVED, OBJECT_JOINTS, ROBOT
 from kmn_skill.planning.phases import PHASE_COUNT, PhaseEnd
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.prototypes import Solution
 
 
 def transfer(
-    solution: Solution, model: KinematicModel, request: PlanRequest
+    solution: Solution, model: KinematicModel, action: Action, request: PlanRequest
 ) -> NDArray[np.float64]:
-    """Return a path (T, D) for a door, made from the solution for another one.
+    """Return a path (T, D) for an object, made from the solution for another one.
 
-    The base is moved by T_theta, and with the handle, whose place depends on gamma. Where the door
-    is to turn by other angles than the other one, or is ajar, the base also turns with it about
-    its hinge. The remaining difference to the present state fades out up to the pre-grasp pose.
+    The base is moved by T_theta, and with what is grasped, whose place depends on gamma and on how
+    far the object is open. The remaining difference to the present state fades out up to the
+    pre-grasp pose.
 
     Parameters
     ----------
     solution
-        For a door at the origin.
+        For an object at the origin.
     """
     solved, path = solution
     guess = path.copy()
-    for column, goal in ((HINGE, request.door_angle), (HANDLE, request.handle_angle)):
-        angles = guess[:, DOOR][:, column]
-        angles[:] = _stretched(angles, request.door_start[column], goal)
+    for column, goal in ((MOVED, request.target), (LATCH, request.unlatched)):
+        positions = guess[:, OBJECT_JOINTS][:, column]
+        positions[:] = _stretched(positions, request.object_start[column], goal)
     pose = model.transformation.matrix(request.theta)
-    hinge, handle = model.joints
-    shift = np.eye(4)
-    shift[:3, 3] = handle.origin(request.gamma) - handle.origin(solved)
+    joint, here, there = action.joint, action.grasp.place(solved), action.grasp.place(request.gamma)
     for before, after in zip(path, guess, strict=True):
-        closing = np.linalg.inv(turn(hinge, solved, before[DOOR][HINGE]))
-        opening = turn(hinge, request.gamma, after[DOOR][HINGE])
-        after[BASE] = move_base(before[BASE], pose @ opening @ shift @ closing)
+        closed = joint.motion(solved, before[OBJECT_JOINTS][MOVED])
+        opened = pose @ joint.motion(request.gamma, after[OBJECT_JOINTS][MOVED])
+        ends = closed @ [*here, 1.0], opened @ [*there, 1.0]
+        yaw = _yaw(opened @ np.linalg.inv(closed))
+        after[BASE] = move_base(before[BASE], yaw, ends[0][:2], ends[1][:2])
     before_handle = PhaseEnd.PRE_GRASP * ((len(path) - 1) // PHASE_COUNT)
     fading = np.clip(1.0 - np.arange(len(path)) / before_handle, 0.0, 1.0)[:, None]
     robot = guess[:, ROBOT]
@@ -48,11 +48,18 @@ def transfer(
     return guess[1:]
 
 
-def move_base(base: NDArray[np.float64], motion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move x, y and yaw (..., 3) by a motion (4, 4) in the plane."""
-    yaw = np.arctan2(motion[1, 0], motion[0, 0])
-    place = base[..., :2] @ rotation_z(yaw)[:2, :2].T + motion[:2, 3]
+def move_base(
+    base: NDArray[np.float64], yaw: float, start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Turn x, y and yaw (..., 3) by an angle (rad), as a point (2,) moves from start to end."""
+    turn = rotation_z(np.array(yaw))[:2, :2]
+    place = (base[..., :2] - start) @ turn.T + end
     return np.concatenate([place, base[..., 2:] + yaw], axis=-1)
+
+
+def _yaw(motion: NDArray[np.float64]) -> float:
+    """Return by what angle (rad) a motion (4, 4) turns about the vertical."""
+    return float(np.arctan2(motion[1, 0], motion[0, 0]))
 
 
 def refine(
@@ -108,9 +115,11 @@ def hermite(
     )
 
 
-def _stretched(angles: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
-    """Let angles that run from 0 to their last value run between other values."""
-    return start + angles / angles[-1] * (end - start)
+def _stretched(positions: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    """Let positions that begin at 0 begin elsewhere, and come as far as another one."""
+    furthest = positions[np.abs(positions).argmax()]
+    way = positions / furthest if furthest else np.linspace(0.0, 1.0, len(positions))
+    return np.asarray(start + way * (end - start))
 
 
 def _resampled(nodes: NDArray[np.float64], count: int) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The planner's world: robot and door in one configuration, with the degrees of freedom of both.
+"""The planner's world: robot and object in one configuration, with the degrees of freedom of both.
 
 Only what moves and what may collide is taken over from the robot's model: the solver copies the
 whole configuration for every time step.
@@ -6,32 +6,33 @@ whole configuration for every time step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import robotic as ry
 from numpy.typing import NDArray
 
-from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.model.parts import REVOLUTE, WORLD, Joint
 from kmn_perception.model.rotation import quaternion_from_matrix
-from kmn_skill.planning.clearance import Box, Surface, sample_surface
-from kmn_skill.planning.layout import ARM, HANDLE
-from kmn_skill.planning.planning_setup import PlanningSetup
-from kmn_skill.planning.robot import RobotModel
+from kmn_perception.model.transformation import AXES
+from kmn_skill.planning.clearance import Box
+from kmn_skill.planning.frames import add_box, add_frame
+from kmn_skill.planning.layout import ARM, OBJECT_JOINTS
+from kmn_skill.planning.planning_setup import NO_LATCH, PlanningSetup
+from kmn_skill.planning.robot_frames import add_robot, boxes
 from kmn_skill.planning.surroundings import Obstacle
 
 PADS, CONTACTS = ("left_pad", "right_pad"), ("left_contact", "right_contact")
-TOOL, GRASP, OBJECT = "tool", "grasp", "object"
+TOOL, GRASP, STANCE, OBJECT = "tool", "grasp", "stance", "object"
 STEM = "stem"  # that joins handle and panel
-BISECTIONS = 40  # of the gripper's angle
-MAX_ROUNDING = 0.4  # a corner's radius is limited to this part of the box
+BISECTIONS = 40  # of the gripper's position
 
 
-def door_body(name: str) -> str:
+def object_body(name: str) -> str:
     """Return the frame of a body of the kinematic model."""
-    return f"door_{name}"
+    return f"object_{name}"
 
 
 def blunt(name: str) -> str:
@@ -44,29 +45,32 @@ def blunt(name: str) -> str:
 
 
 class World:
-    """Robot and door m(theta, gamma) in a configuration of the package robotic.
+    """Robot and object m(theta, gamma) in a configuration of the package robotic.
 
     Parameters
     ----------
     theta, gamma
         (n,) transformation and (m,) configuration parameters.
     obstacles
-        What stands around the door.
+        What stands around the object.
 
     Attributes
     ----------
     configuration
         With the dofs in the order of `joint_names`.
     joint_names
-        (D,) names: base x, y, yaw, those of the arm, the gripper, hinge and handle.
+        (D,) names: base x, y, yaw, those of the arm, the gripper, and the object's two.
     model_joints
         The same joints in the configuration, which has one for the base.
-    door_bodies
-        Bodies of the kinematic model that hinge and handle move.
     obstacle_names
-        Of what stands around the door.
+        Of what stands around the object.
     touching
-        The gripper's angle at which the pads touch the handle, radians.
+        The gripper's position at which the pads touch the handle, m or rad.
+
+    Raises
+    ------
+    ConfigurationError
+        If the robot's file names what its model lacks, or the gripper cannot take the handle.
     """
 
     def __init__(
@@ -76,21 +80,20 @@ class World:
         gamma: NDArray[np.float64],
         obstacles: Sequence[Obstacle] = (),
     ) -> None:
-        model, robot = setup.model, setup.robot
+        robot = setup.robot
         self.setup, self._gamma, self._obstacles = setup, gamma, obstacles
         self.joint_names = setup.joint_names
-        self.model_joints = (*robot.model_joints, *(joint.name for joint in model.joints))
-        self.door_bodies = tuple(joint.body for joint in model.joints)
+        self.model_joints = (*robot.model_joints, *self.joint_names[OBJECT_JOINTS])
         self.obstacle_names = tuple(obstacle.name for obstacle in obstacles)
         self.configuration = ry.Config()
         self.configuration.addFrame("world")
-        _add_robot(self.configuration, robot)
-        for name in setup.settings.policy.blunt_collisions:
+        add_robot(self.configuration, robot)
+        for name in robot.planning.collisions.blunt:
             size = boxes(robot)[name].size
-            _add_box(self.configuration, blunt(name), name, np.zeros(3), size, np.inf)
-        _add_door(self.configuration, model, theta, gamma)
+            add_box(self.configuration, blunt(name), name, np.zeros(3), size, np.inf)
+        _add_object(self.configuration, setup, theta, gamma)
         for name, centre, size in obstacles:
-            _add(self.configuration, name, OBJECT, centre).setShape(ry.ST.box, size)
+            add_frame(self.configuration, name, OBJECT, centre).setShape(ry.ST.box, size)
         self._add_contacts()
         self.configuration.selectJoints(list(self.model_joints))
 
@@ -111,11 +114,11 @@ class World:
             pose[:] = [handle.getTransform() for handle in handles]
         return poses
 
-    def door_boxes(self) -> dict[str, Box]:
-        """Return the boxes of the door's bodies, of the `STEM` if it has one, and around it."""
+    def object_boxes(self) -> dict[str, Box]:
+        """Return the boxes of the object's bodies, of the `STEM` if it has one, and around it."""
         model, gamma = self.setup.model, self._gamma
         found = {
-            body.name: Box(door_body(body.name), np.zeros(3), body.size(gamma))
+            body.name: Box(object_body(body.name), np.zeros(3), body.size(gamma))
             for body in model.bodies
         }
         if model.stem is not None:
@@ -126,167 +129,127 @@ class World:
         return found
 
     def _add_contacts(self) -> None:
-        """Add the two points of the gripper, those of the handle, and the frames between them."""
-        model, robot, gamma = self.setup.model, self.setup.robot, self._gamma
-        grasp, joint = self.setup.settings.grasp, model.joints[HANDLE]
-        body = model.body(grasp.body)
-        centre = body.centre(gamma) + grasp.offset - joint.origin(gamma)
-        half = np.where([axis == grasp.axis for axis in "xyz"], body.size(gamma) / 2.0, 0.0)
-        _add(self.configuration, GRASP, joint.name, centre)
+        """Add the two points of the gripper, those of what it grasps, and frames between them.
+
+        The frame of the grasp has x ahead, as the object, and z from the one point to the other.
+        """
+        robot, grasp, gamma = self.setup.robot, self.setup.action.grasp, self._gamma
+        body = object_body(grasp.body.name)
+        place = grasp.place(gamma) - grasp.body.centre(gamma)
+        across = np.eye(3)[AXES.index(grasp.axis)]
+        ahead = np.eye(3)[0] if grasp.axis != "x" else np.eye(3)[1]
+        turn = np.column_stack([ahead, np.cross(across, ahead), across])
+        half = grasp.thickness(gamma) / 2.0 * across
+        add_frame(self.configuration, GRASP, body, place, turn)
+        add_frame(self.configuration, STANCE, body, place)
         for name, side in zip(CONTACTS, (half, -half), strict=True):
-            _add(self.configuration, name, joint.name, centre + side)
-        for name, pad in zip(PADS, robot.planning.pads, strict=True):
-            _add(self.configuration, name, pad.joint, np.array(pad.point))
+            add_frame(self.configuration, name, body, place + side)
+        pads = robot.planning.pads
+        for name, pad in zip(PADS, pads[:2], strict=True):
+            add_frame(self.configuration, name, pad.joint, np.array(pad.point))
         self.configuration.selectJoints([robot.gripper.joint])
         self.touching = self._close(2.0 * float(np.linalg.norm(half)))
         hand = robot.joint_names[ARM][-1]
-        left, right = (self.configuration.getFrame(name).getPosition() for name in PADS)
+        left, right = self._pads()
         pose = self.configuration.getFrame(hand).getTransform()
         middle = pose[:3, :3].T @ ((left + right) / 2.0 - pose[:3, 3])
-        _add(self.configuration, TOOL, hand, middle)
+        finger = self.configuration.getFrame(pads.left.joint).getRotationMatrix()
+        # Rounded: axes that coincide do so exactly, and plans are the same on any machine.
+        turn = np.round(pose[:3, :3].T @ _axes(finger @ pads.forwards, left - right), 9)
+        add_frame(self.configuration, TOOL, hand, middle, turn)
 
     def _close(self, gap: float) -> float:
-        """Close the gripper until the pads are so far apart (m); return its angle (rad)."""
+        """Close the gripper until the pads are so far apart (m); return its position (m or rad).
+
+        Raises
+        ------
+        ConfigurationError
+            If they never are.
+        """
         low, high = np.array(self.configuration.getJointLimits()).reshape(-1)
+        closed, opened = self._apart(low), self._apart(self.setup.robot.planning.grip.open)
+        if not closed < gap < opened:
+            raise ConfigurationError(
+                f"robot '{self.setup.robot.name}': planning: the pads are {closed:.3f} m apart "
+                f"where the gripper is closed and {opened:.3f} m where it is open, which does "
+                f"not take '{self.setup.action.grasp.body.name}' of {gap:.3f} m"
+            )
         for _ in range(BISECTIONS):
             middle = (low + high) / 2.0
-            self.configuration.setJointState([middle])
-            left, right = (self.configuration.getFrame(name).getPosition() for name in PADS)
-            low, high = (middle, high) if np.linalg.norm(left - right) < gap else (low, middle)
+            low, high = (middle, high) if self._apart(middle) < gap else (low, middle)
         return float(low)
 
+    def _apart(self, gripper: float) -> float:
+        """Return the distance of the pads at a position of the gripper, metres."""
+        self.configuration.setJointState([gripper])
+        left, right = self._pads()
+        return float(np.linalg.norm(left - right))
 
-@cache
-def boxes(robot: RobotModel) -> dict[str, Box]:
-    """Return the box about the meshes of each body of the robot, in its joint's frame."""
-    found = {}
-    for name, (vertices, _) in _meshes(robot).items():
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        found[name] = Box(robot.planning.bodies[name].joint, (low + high) / 2.0, high - low)
-    return found
-
-
-@cache
-def surfaces(robot: RobotModel, spacing: float) -> dict[str, Surface]:
-    """Return points on the meshes of each body of the robot, ``spacing`` apart (m)."""
-    return {
-        name: Surface.of(
-            robot.planning.bodies[name].joint, sample_surface(vertices, triangles, spacing)
-        )
-        for name, (vertices, triangles) in _meshes(robot).items()
-    }
+    def _pads(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        left, right = (self.configuration.getFrame(name).getPosition() for name in PADS)
+        return left, right
 
 
-@cache
-def _meshes(robot: RobotModel) -> dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]:
-    """Return vertices (V, 3) and triangles (F, 3) of each body, in its joint's frame."""
-    source = _source(robot)
-    found = {}
-    for name, body in robot.planning.bodies.items():
-        origin = np.linalg.inv(source.getFrame(body.joint).getTransform())
-        vertices, triangles, count = [], [], 0
-        for part in body.meshes:
-            frame = source.getFrame(part)
-            pose = origin @ frame.getTransform()
-            points = frame.getMeshPoints() @ pose[:3, :3].T + pose[:3, 3]
-            faces = frame.getMeshTriangles().astype(np.int64)
-            heights = points[faces][..., 2].mean(axis=1)
-            inside = (heights <= body.below) & (heights >= body.above)
-            vertices.append(points)
-            triangles.append(faces[inside] + count)
-            count += len(points)
-        faces = np.concatenate(triangles)
-        used, numbers = np.unique(faces, return_inverse=True)
-        found[name] = np.concatenate(vertices)[used], numbers.reshape(faces.shape)
-    return found
+def _axes(forwards: NDArray[np.float64], across: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the axes (3, 3) of a tool: x forwards, y across from the right finger to the left."""
+    y = across / np.linalg.norm(across)
+    x = forwards - (forwards @ y) * y
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, y, np.cross(x, y)])
 
 
-@cache
-def _source(robot: RobotModel) -> Any:
-    source = ry.Config()
-    source.addFile(ry.raiPath(robot.source))
-    return source
-
-
-def _add_robot(configuration: Any, robot: RobotModel) -> None:
-    """Add the robot's joints and a box about each of its bodies."""
-    source = _source(robot)
-    joints = [*robot.model_joints, *robot.gripper.followers]
-    for name in joints:
-        frame = source.getFrame(name)
-        carrier = frame.getParent()
-        offset = np.eye(4)
-        if name != robot.base:
-            fixed = carrier.getTransform()
-            while carrier.name not in joints:
-                carrier = carrier.getParent()
-            offset = np.linalg.inv(carrier.getTransform()) @ fixed
-        _add(configuration, f"{name}_origin", carrier.name, offset[:3, 3], offset[:3, :3])
-        _add_joint(configuration, frame, robot)
-    for name, box in boxes(robot).items():
-        _add_box(configuration, name, box.frame, box.centre, box.size, robot.planning.rounding)
-
-
-def _add_joint(configuration: Any, frame: Any, robot: RobotModel) -> None:
-    attributes: Mapping[str, Any] = frame.getAttributes()
-    joint = configuration.addFrame(frame.name, f"{frame.name}_origin")
-    options: dict[str, Any] = {"scale": attributes.get("joint_scale", 1.0)}
-    if "limits" in attributes:
-        options["limits"] = attributes["limits"]
-    if frame.name in robot.gripper.followers:
-        options["mimic"] = configuration.getFrame(robot.gripper.joint)
-    joint.setJoint(frame.getJointType(), **options)
-
-
-def _add_door(
+def _add_object(
     configuration: Any,
-    model: KinematicModel,
+    setup: PlanningSetup,
     theta: NDArray[np.float64],
     gamma: NDArray[np.float64],
 ) -> None:
-    """Add the kinematic model: its joints, and a box for each body."""
+    """Add the kinematic model: a box for each body, and the joints of the action.
+
+    Its other joints stay where they are.
+    """
+    model, moved = setup.model, setup.action.joints
     pose = model.transformation.matrix(theta)
-    _add(configuration, OBJECT, "world", pose[:3, 3], pose[:3, :3])
-    frames = {"world": OBJECT}
-    origins: dict[str, NDArray[np.float64]] = {"world": np.zeros(3)}
+    add_frame(configuration, OBJECT, "world", pose[:3, 3], pose[:3, :3])
+    frames = {WORLD: OBJECT}
+    origins: dict[str, NDArray[np.float64]] = {WORLD: np.zeros(3)}
     for joint in model.joints:
-        origin, parent = joint.origin(gamma), frames[joint.parent]
-        _add(configuration, f"{joint.name}_origin", parent, origin - origins[joint.parent])
-        frame = configuration.addFrame(joint.name, f"{joint.name}_origin")
-        frame.setJoint(ry.JT.hinge, axis=joint.axis, limits=joint.limits)
+        parent = joint.parent if joint.parent in frames else WORLD
+        origin = joint.origin(gamma)
+        where = f"{joint.name}_origin"
+        add_frame(configuration, where, frames[parent], origin - origins[parent])
+        frame = configuration.addFrame(joint.name, where)
         frames[joint.body], origins[joint.body] = joint.name, origin
+        if joint.name not in {each.name for each in moved}:
+            continue
+        if joint.type == REVOLUTE:
+            frame.setJoint(ry.JT.hinge, axis=joint.axis, limits=joint.limits)
+        else:
+            frames[joint.body] = _slide(configuration, joint)
+    if setup.action.unlatch is None:
+        configuration.addFrame(NO_LATCH, OBJECT).setJoint(ry.JT.hinge, limits=[-1.0, 1.0])
     for body in model.bodies:
         carrier = frames.get(body.name, OBJECT)
         centre = body.centre(gamma) - origins.get(body.name, np.zeros(3))
-        _add(configuration, door_body(body.name), carrier, centre).setShape(
+        add_frame(configuration, object_body(body.name), carrier, centre).setShape(
             ry.ST.box, body.size(gamma)
         )
 
 
-def _add_box(
-    configuration: Any,
-    name: str,
-    parent: str,
-    centre: NDArray[np.float64],
-    size: NDArray[np.float64],
-    rounding: float,
-) -> None:
-    """Add a box with rounded edges at a place in a frame; see `MAX_ROUNDING`."""
-    radius = min(rounding, MAX_ROUNDING * size.min())
-    _add(configuration, name, parent, centre).setShape(ry.ST.ssBox, [*size, radius])
+def _slide(configuration: Any, joint: Joint) -> str:
+    """Let the frame of a joint slide along its axis; return a frame with it that is not turned.
 
-
-def _add(
-    configuration: Any,
-    name: str,
-    parent: str,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64] | None = None,
-) -> Any:
-    """Add a frame at a place in its parent's."""
-    frame = configuration.addFrame(name, parent)
-    frame.setRelativePosition(position)
-    if rotation is not None:
-        x, y, z, w = quaternion_from_matrix(rotation)
-        frame.setRelativeQuaternion([w, x, y, z])
-    return frame
+    A joint of the package robotic slides along the x of its frame.
+    """
+    ahead = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    aside = np.cross(ahead, np.roll(np.abs(ahead), 1))
+    if not aside.any():
+        aside = np.cross(ahead, [1.0, 0.0, 0.0])
+    aside /= np.linalg.norm(aside)
+    turn = np.column_stack([ahead, aside, np.cross(ahead, aside)])
+    x, y, z, w = quaternion_from_matrix(turn)
+    configuration.getFrame(f"{joint.name}_origin").setRelativeQuaternion([w, x, y, z])
+    configuration.getFrame(joint.name).setJoint(ry.JT.transX, limits=joint.limits)
+    name = f"{joint.name}_moved"
+    add_frame(configuration, name, joint.name, np.zeros(3), turn.T)
+    return name

@@ -6,26 +6,28 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Point
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from control_msgs.msg import JointTolerance
+from geometry_msgs.msg import Point, Twist, Vector3
+from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
 
-from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import MessageError, cube_marker
 from kmn_perception.ros.stamps import duration_of, seconds, stamp_of
-from kmn_skill.execution.goal import SUCCESS, Result
-from kmn_skill.execution.perceived_door import DoorObservation
+from kmn_skill.execution.base_motion import Motion
+from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import Sample
-from kmn_skill.planning.kinematics import moved_cubes
-from kmn_skill.planning.layout import BASE_POSITION, HANDLE
+from kmn_skill.planning.layout import BASE_POSITION
 from kmn_skill.planning.plan import Plan
 
+ERASED = -1.0  # a tolerance that the controller shall not have
 PATH_WIDTH = 0.02  # metres
 RECESS = "recess"  # of the surroundings: how far the panel lies behind the wall's face
 HANDLES = ("", "lever")  # kinds that the policy can turn; models of one kind do not name it
@@ -34,8 +36,14 @@ HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
 DOOR_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=0.3)
 
 
-def observation_from_message(message: MorphingParameters) -> DoorObservation:
-    """Read morphing parameters, be they valid or not."""
+def observation_from_message(message: MorphingParameters, hinge: str) -> DoorObservation:
+    """Read morphing parameters, be they valid or not.
+
+    Parameters
+    ----------
+    hinge
+        Name of the joint about which the door turns.
+    """
     values = np.array([*message.theta, *message.gamma], dtype=np.float64)
     covariance = np.array(message.covariance, dtype=np.float64)
     if covariance.size == values.size**2:
@@ -48,14 +56,23 @@ def observation_from_message(message: MorphingParameters) -> DoorObservation:
         values=values,
         covariance=covariance,
         problem=_problem(message),
-        recess=_recess(message),
+        lacks_handle=_lacks_handle(message),
+        number=message.id,
+        recess=_told(message.surroundings_names, message.surroundings, RECESS),
+        hinge=_told(message.joint_names, message.joint_positions, hinge),
     )
 
 
-def _recess(message: MorphingParameters) -> float:
-    """Return how far the panel lies behind the wall's face (m), NaN where that is not told."""
-    told = zip(message.surroundings_names, message.surroundings, strict=False)
-    return float(dict(told).get(RECESS, math.nan))
+def _told(names: Sequence[str], values: Sequence[float], name: str) -> float:
+    """Return the value of a name, NaN where it is not told."""
+    return float(dict(zip(names, values, strict=False)).get(name, math.nan))
+
+
+def _lacks_handle(message: MorphingParameters) -> bool:
+    """Tell whether a door is known but for its handle, which may be another kind from near."""
+    if message.status == MorphingParameters.OK:
+        return not message.mirrored and message.alternative not in HANDLES
+    return bool(message.status == MorphingParameters.HANDLE_NOT_SEEN)
 
 
 def _problem(message: MorphingParameters) -> str:
@@ -90,6 +107,32 @@ def sample_from_state(message: JointState, names: Sequence[str]) -> Sample:
     return Sample(seconds(message.header.stamp), positions)
 
 
+def motion_from_odometry(message: Odometry) -> Motion:
+    """Read where the base is and how it moves.
+
+    Raises
+    ------
+    MessageError
+        If a number is not finite.
+    """
+    pose, twist = message.pose.pose, message.twist.twist
+    turn = pose.orientation
+    yaw = 2.0 * math.atan2(turn.z, turn.w)  # of a base in the plane
+    where = np.array([pose.position.x, pose.position.y, yaw])
+    velocity = np.array([twist.linear.x, twist.linear.y, twist.angular.z])
+    if not np.isfinite([*where, *velocity]).all():
+        raise MessageError(
+            "not_finite", f"numbers are not finite: {where.tolist()}, {velocity.tolist()}"
+        )
+    return Motion(seconds(message.header.stamp), where, velocity, message.child_frame_id)
+
+
+def twist(velocity: NDArray[np.float64]) -> Twist:
+    """Make the message of a base's velocity (3,): ahead, to the left, and of the turn."""
+    x, y, turn = velocity.tolist()
+    return Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=turn))
+
+
 def trajectory_from_part(part: Part, names: Sequence[str]) -> JointTrajectory:
     """Make the message of a part of a plan."""
     points = [
@@ -105,19 +148,46 @@ def trajectory_from_part(part: Part, names: Sequence[str]) -> JointTrajectory:
     )
 
 
-def result_message(result: Result) -> OpenDoor.Result:
-    """Make the message of a goal's result."""
-    report = result.report
-    return OpenDoor.Result(
-        success=result.outcome == SUCCESS,
-        reason=result.reason,
-        handle_angle=result.handle_angle,
-        door_angle=result.door_angle,
-        planning_time=report.planning_time if report else math.nan,
-        contact_error=report.contact_error if report else math.nan,
-        clearance=report.clearance if report else math.nan,
-        attempts=result.attempts,
+def goal_from_trajectory(trajectory: JointTrajectory, presses: str) -> FollowJointTrajectory.Goal:
+    """Make the goal of a controller, to be followed as closely as the controller itself demands.
+
+    Parameters
+    ----------
+    presses
+        The joint, if it is among them, that presses and so never gets where it is sent.
+    """
+    free = [JointTolerance(name=n, position=ERASED) for n in trajectory.joint_names if n == presses]
+    return FollowJointTrajectory.Goal(
+        trajectory=trajectory, path_tolerance=free, goal_tolerance=free
     )
+
+
+def gripper_goal(position: float, max_effort: float) -> GripperCommand.Goal:
+    """Make the goal of a gripper: a position (m or rad), and the largest effort (N or N m)."""
+    goal = GripperCommand.Goal()
+    goal.command.position, goal.command.max_effort = position, max_effort
+    return goal
+
+
+def hold_trajectory(
+    positions: NDArray[np.float64], names: Sequence[str], duration: float
+) -> JointTrajectory:
+    """Make the message that lets joints come to rest at positions (J,), m and rad.
+
+    A single point, which takes the place of whatever runs; an empty trajectory is refused by
+    controllers.
+
+    Parameters
+    ----------
+    duration
+        Seconds until they rest; a stamp of 0 means that these count from when the message comes.
+    """
+    point = JointTrajectoryPoint(
+        positions=positions.tolist(),
+        velocities=[0.0] * len(names),
+        time_from_start=duration_of(duration),
+    )
+    return JointTrajectory(joint_names=list(names), points=[point])
 
 
 def markers_from_plan(
@@ -125,8 +195,10 @@ def markers_from_plan(
 ) -> MarkerArray:
     """Draw the paths of base and handle as lines, and the door as it will stand."""
     base = np.column_stack([plan.positions[:, BASE_POSITION], np.zeros(len(plan.times))])
-    handle = [body.name for body in model.bodies].index(model.joints[HANDLE].body)
-    cubes = [moved_cubes(model, values, angles) for angles in plan.door]
+    action = model.actions[0]
+    handle = [body.name for body in model.bodies].index(action.grasp.body.name)
+    joints = plan.object_joints
+    cubes = [model.moved_cubes(values, action.positions(each)) for each in joints]
     levers = np.array([each[handle][:3, 3] for each in cubes])
     markers = [
         Marker(header=header, action=Marker.DELETEALL),

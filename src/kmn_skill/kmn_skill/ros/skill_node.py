@@ -1,60 +1,61 @@
-"""The node that opens doors: an action in, joint trajectories out."""
+"""The node that opens objects: actions in, joint trajectories out."""
 
 from __future__ import annotations
 
-import threading
-import time
-import traceback
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
-from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.node_program import run_node
+from kmn_perception.ros.overridable_node import OverridableNode
 from kmn_perception.ros.parameters import declare_parameters, read_parameters
 from kmn_perception.ros.reports import ChangeWarnings, ThrottledWarnings, report_periodically
 from kmn_perception.ros.stamps import seconds
 from kmn_skill.execution.door_memory import DoorMemory
+from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.errors import DoorError
-from kmn_skill.execution.goal import SUCCESS, Goal, Result
-from kmn_skill.execution.opening import DoorOpening, Knowledge
+from kmn_skill.execution.goal import Goal, Result
+from kmn_skill.execution.held_door import HeldDoor
+from kmn_skill.execution.knowledge import Knowledge
+from kmn_skill.execution.opening import DoorOpening
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.plan_execution import Part
-from kmn_skill.execution.states import DOOR, ROBOT, StateWatch
+from kmn_skill.execution.states import BASE, StateWatch
 from kmn_skill.planning.plan import Plan
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.ros import messages
+from kmn_skill.ros.controls import make_control
+from kmn_skill.ros.door_frames import DoorFrames
 from kmn_skill.ros.goal_client import GoalClient
-from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
+from kmn_skill.ros.goal_interfaces import OpenDoorInterface, OperateJointInterface
+from kmn_skill.ros.goal_server import GoalServer
+from kmn_skill.ros.skill_node_parameters import ENCODERS, SkillNodeSettings
 from kmn_skill.ros.skill_statistics import SkillStatistics
+from kmn_skill.ros.state_reading import StateReader
 
 QUEUE_DEPTH = 10
-POLL_PERIOD = 0.05  # seconds
-GOAL_TIMEOUT = 10.0  # seconds in which a goal ends when the node does
-FAREWELL = 0.5  # seconds in which its client then may ask for the result
 
 
-class SkillNode(Node):
-    """Opens one door at a time, in a thread of its own; the executor only takes messages.
+class SkillNode(OverridableNode):
+    """Opens one object at a time, in a thread of its own; the executor only takes messages.
 
     Raises
     ------
@@ -67,48 +68,46 @@ class SkillNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
         self._settings = settings = SkillNodeSettings.check(declare_parameters(self, "skill_node"))
-        setup = PlanningSetup.load(settings.model)
-        self._joints = {
-            ROBOT: setup.robot.joint_names,
-            DOOR: tuple(joint.name for joint in settings.model.joints),
-        }
+        setup = PlanningSetup.load(settings.model, settings.robot)
+        self._action = setup.action
+        door_joints = tuple(joint.name for joint in setup.action.joints)
+        measured = door_joints if settings.door_angles == ENCODERS else ()
+        self._warnings, self._refusals = ThrottledWarnings(self), ChangeWarnings(self)
+        self._frames = DoorFrames(self, self._warnings, settings, self._use)
+        self._states = StateReader(setup.robot, measured, self._frames.base_pose)
+        self._control = make_control(
+            self, setup.robot, self._states.odometry, lambda: self._settings, self.now
+        )
+        self._ending = ExitStack()
+        planner = Planner(
+            setup, Prototypes.load(setup.action.motions, settings.robot), settings.planning_time
+        )
+        self._planner = self._ending.enter_context(planner)
         self._knowledge = Knowledge(
             settings.model,
             PerceivedDoor(settings.model, settings.world_frame, settings.door),
-            DoorMemory(),
-            StateWatch(settings.states, self._joints),
+            DoorMemory(self._memory_file(setup), self.tell),
+            StateWatch(settings.states, self._states.joints, continuous=setup.robot.continuous),
+            HeldDoor(settings.model, setup.action, planner.pads, settings.grip),
             setup.settings.surroundings,
         )
-        self._ending = ExitStack()
-        planner = Planner(setup, Prototypes.load(), settings.planning_time)
-        self._planner = self._ending.enter_context(planner)
         self._statistics = SkillStatistics()
-        self._warnings, self._refusals = ThrottledWarnings(self), ChangeWarnings(self)
-        self._busy, self._closing = False, threading.Event()
-        self._worker: threading.Thread | None = None  # of the goal
         self._connect()
         self.add_on_set_parameters_callback(self._on_parameters)
-        self.get_logger().info(f"opening doors of model '{settings.model.name}'")
+        self.get_logger().info(f"opening '{settings.model.name}' with {setup.robot.name}")
 
     def close(self) -> None:
-        """Let the robot hold and the client of a goal get its result.
+        """Let the robot hold and the clients of goals get their results.
 
         Meanwhile the executor must go on.
         """
-        self._closing.set()
-        if self._busy:
-            deadline = time.monotonic() + GOAL_TIMEOUT
-            while self._busy and time.monotonic() < deadline:
-                time.sleep(POLL_PERIOD)
-            time.sleep(FAREWELL)
+        self._server.close()
 
     def destroy_node(self) -> None:
         """Let the robot hold, and end the planner and the node."""
-        self._closing.set()
-        if self._worker is not None:
-            self._worker.join()
+        self._server.destroy()
         self._ending.close()
-        self._server.destroy()  # of which the base class does not know
+        self._control.destroy()
         super().destroy_node()
 
     def now(self) -> float:
@@ -131,116 +130,92 @@ class SkillNode(Node):
         self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
 
     def send(self, part: Part) -> None:
-        """Publish a part of a plan."""
-        message = messages.trajectory_from_part(part, self._joints[ROBOT])
-        self._trajectory_publisher.publish(message)
+        """Send a part of a plan."""
+        self._control.send(part)
 
-    def hold(self) -> None:
-        """Let the robot hold where it is."""
-        self._trajectory_publisher.publish(JointTrajectory())
+    def are_through(self) -> bool:
+        """Tell whether the controllers have done what they were sent; raise if one failed."""
+        return self._control.are_through()
+
+    def hold(self, positions: NDArray[np.float64]) -> None:
+        """Let the robot hold at positions (J,), m and rad."""
+        self._control.hold(positions, self._settings.execution.hold_duration)
 
     def tell(self, text: str) -> None:
         """Log a warning."""
         self.get_logger().warning(text)
 
+    def _memory_file(self, setup: PlanningSetup) -> Path:
+        """Return the file in which this node keeps the door, beside the logs of ROS.
+
+        It is of one model, robot and frame: numbers of another one would look alike.
+        """
+        home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
+        name = self.get_fully_qualified_name().strip("/").replace("/", ".")
+        frame = self._settings.world_frame.replace("/", "_")
+        of = f"{self.context.get_domain_id()}.{setup.model.name}.{setup.robot.name}.{frame}"
+        return Path(home) / "kmn_skill" / f"{name}.{of}.json"
+
     def _connect(self) -> None:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._trajectory_publisher = self.create_publisher(
-            JointTrajectory, "joint_trajectory", QUEUE_DEPTH
-        )
         self._path_publisher = self.create_publisher(MarkerArray, "planned_path", latched)
-        for topic in self._joints:
-            self.create_subscription(JointState, topic, partial(self._on_state, topic), 1)
+        for topic in self._states.joints:
+            kind = Odometry if topic == BASE else JointState
+            self.create_subscription(kind, topic, partial(self._on_state, topic), 1)
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self._on_parameters_of_door, QUEUE_DEPTH
         )
         report_periodically(self, self._report)
-        self._server = ActionServer(
+        self._server = GoalServer(
             self,
-            OpenDoor,
-            "open_door",
-            self._on_open_door,
-            goal_callback=self._on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            (OpenDoorInterface(), OperateJointInterface(self._settings.model, self._action)),
+            self._pursue,
+            self._statistics,
+            self._warnings,
+            lambda: self._settings.preempt,
         )
 
-    def _on_state(self, topic: str, message: JointState) -> None:
+    def _on_state(self, topic: str, message: JointState | Odometry) -> None:
         try:
-            sample = messages.sample_from_state(message, self._joints[topic])
+            sample = self._states.read(topic, message)
         except MessageError as error:
             self._refuse(topic, f"{topic}_{error.reason}", error)
             return
         self._refusals.clear(topic)
-        _, door, memory, watch, _ = self._knowledge
+        if sample is None:
+            return
+        knowledge = self._knowledge
+        watch = knowledge.watch
         breaks = watch.breaks
         watch.put(topic, sample)
         if watch.breaks != breaks:
-            door.forget(sample.time)
-            memory.forget()
+            knowledge.door.forget(sample.time)
+            knowledge.held.let_go()
+            knowledge.memory.forget()
             self._warnings.warn("break", f"another world: {watch.last_break}")
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
+        observation = messages.observation_from_message(message, self._action.joint.name)
+        self._frames.take(observation, message.header.stamp)
+
+    def _use(self, observation: DoorObservation) -> None:
         try:
-            self._knowledge.door.add(messages.observation_from_message(message))
+            self._knowledge.door.add(observation)
         except DoorError as error:
             self._refuse("morphing_parameters", error.reason, error)
         else:
             self._refusals.clear("morphing_parameters")
             self._statistics.use()
 
-    def _on_goal(self, request: OpenDoor.Goal) -> GoalResponse:
-        """Accept a goal if none runs; whether it can be reached is for its result to tell."""
-        if not self._busy and not self._closing.is_set():
-            self._busy = True
-            return GoalResponse.ACCEPT
-        text = "goal rejected: another one runs, which must end or be cancelled first"
-        self._statistics.reject(text)
-        self._warnings.warn("rejected", text)
-        return GoalResponse.REJECT
-
-    async def _on_open_door(self, goal_handle: ServerGoalHandle) -> OpenDoor.Result:
-        """Open the door in a thread, so that the executor goes on meanwhile."""
-        executor = self.executor
-        assert executor is not None
-        done = Future()
-        done.add_done_callback(lambda _: executor.wake())
-        self._worker = threading.Thread(target=self._work, args=(goal_handle, done), name="goal")
-        self._worker.start()
-        result: Result = await done
-        self._busy = False
-        return messages.result_message(result)
-
-    def _work(self, goal_handle: ServerGoalHandle, done: Future) -> None:
-        request = goal_handle.request
-        result = self._open(goal_handle, Goal(request.handle_angle, request.door_angle))
-        try:
-            self._finish(goal_handle, result)
-        finally:
-            done.set_result(result)
-
-    def _open(self, goal_handle: ServerGoalHandle, goal: Goal) -> Result:
+    def _pursue(self, goal: Goal, client: GoalClient) -> Result:
+        """Pursue a goal to its result."""
         settings = self._settings
-        client = GoalClient(goal_handle, self._closing, self._statistics)
+        if self._knowledge.door.choose(goal.object_id):
+            self._knowledge.memory.forget()  # of whichever object that was
         opening = DoorOpening(
             self._knowledge, self._planner, self, client, settings.opening, settings.execution
         )
-        try:
-            return opening.run(goal)
-        except Exception as error:  # a node never dies of a goal
-            self.get_logger().error(traceback.format_exc())
-            return Result("internal_error", repr(error))
-
-    def _finish(self, goal_handle: ServerGoalHandle, result: Result) -> None:
-        self._statistics.finish(result)
-        if result.outcome == SUCCESS:
-            self.get_logger().info(f"the door is open by {result.door_angle:.2f} rad")
-            goal_handle.succeed()
-            return
-        self.get_logger().warning(f"the door was not opened, {result.outcome}: {result.reason}")
-        if goal_handle.is_cancel_requested:
-            goal_handle.canceled()
-        else:
-            goal_handle.abort()
+        return opening.run(goal)
 
     def _refuse(self, topic: str, reason: str, error: Exception) -> None:
         self._statistics.refuse(reason)
@@ -265,7 +240,9 @@ class SkillNode(Node):
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
         self._knowledge.door.settings = settings.door
+        self._frames.settings = settings
         self._knowledge.watch.settings = settings.states
+        self._knowledge.held.settings = settings.grip
         return SetParametersResult(successful=True)
 
 

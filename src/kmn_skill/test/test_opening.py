@@ -1,0 +1,120 @@
+"""Which door a goal is planned for: where one was before the robot hid it, or another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from kmn_perception.configuration.node_parameters import load_node_parameters
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.door_memory import DoorMemory
+from kmn_skill.execution.door_observation import DoorObservation, when_closed
+from kmn_skill.execution.goal import Feedback, Goal
+from kmn_skill.execution.grasp_quantities import hinge_distance, swung
+from kmn_skill.execution.held_door import HeldDoor
+from kmn_skill.execution.knowledge import Knowledge
+from kmn_skill.execution.opening import DoorOpening
+from kmn_skill.execution.perceived_door import PerceivedDoor
+from kmn_skill.execution.states import Sample, StateWatch
+from kmn_skill.planning.plan import PlanningFailed, PlanRequest
+from kmn_skill.planning.planning_setup import PlanningSetup
+from kmn_skill.ros.skill_node_parameters import SkillNodeSettings
+
+STATED = load_node_parameters("skill_node")
+SETTINGS = SkillNodeSettings.check({name: each.default for name, each in STATED.items()})
+MODEL = KinematicModel.load("door")
+SETUP = PlanningSetup.load(MODEL)
+NOW = 100.0  # seconds
+DOOR: NDArray[np.float64] = np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0, 0.0])
+
+
+class Planner:
+    """Keeps what is to be planned, and knows no plan."""
+
+    request: PlanRequest | None = None
+
+    drives = True
+
+    def plan(self, request: PlanRequest, cancelled: Callable[[], bool]) -> Any:
+        self.request = request
+        raise PlanningFailed("none is known")
+
+    def reach(self, values: NDArray[np.float64], positions: NDArray[np.float64]) -> float:
+        return -1.0
+
+
+class Robot:
+    """Stands still, and tells nobody."""
+
+    hold_duration = 0.1
+
+    def now(self) -> float:
+        return NOW
+
+    def hold(self, positions: NDArray[np.float64]) -> None:
+        pass
+
+    def tell(self, text: str) -> None:
+        pass
+
+    def interruption(self) -> None:
+        return None
+
+    def feed_back(self, feedback: Feedback) -> None:
+        pass
+
+
+def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float64]:
+    """Return the door that is planned for, when one is seen after the robot has driven a metre."""
+    home = SETUP.robot.home
+    memory = DoorMemory()
+    if remembered:
+        memory.keep(DOOR, home, NOW)
+    watch = StateWatch(SETTINGS.states, {"joint_states": SETUP.robot.joint_names})
+    driven = home.copy()
+    driven[0] += 1.0
+    watch.put("joint_states", Sample(NOW, driven))
+    door = PerceivedDoor(MODEL, "world", SETTINGS.door)
+    names = tuple(parameter.name for parameter in MODEL.parameters)
+    for age in (0.2, 0.1, 0.0):
+        covariance = 1e-8 * np.eye(len(seen))
+        door.add(DoorObservation(NOW - age, "door", "world", names, seen, covariance, ""))
+    held = HeldDoor(MODEL, SETUP.action, lambda robot: np.zeros((2, 3)), SETTINGS.grip)
+    knowledge = Knowledge(MODEL, door, memory, watch, held, SETUP.settings.surroundings)
+    planner, robot = Planner(), Robot()
+    opening: Any = DoorOpening
+    result = opening(knowledge, planner, robot, robot, SETTINGS.opening, SETTINGS.execution).run(
+        Goal(-0.7, -0.9)
+    )
+    assert result.outcome == "no_plan"
+    assert planner.request is not None
+    return np.concatenate([planner.request.theta, planner.request.gamma])
+
+
+def test_a_door_that_the_robot_may_hide_is_where_it_was_before() -> None:
+    hidden = DOOR + [0.04, -0.03, 0.05, 0.0, 0.0, 0.0, 0.0]
+    assert planned_for(hidden, remembered=True) == pytest.approx(DOOR)
+    assert planned_for(hidden, remembered=False) == pytest.approx(hidden)
+
+
+@pytest.mark.parametrize("away", [[0.0, 0.7, 0.0], [-0.6, 0.2, 0.5]])
+def test_another_door_is_not_taken_for_the_one_before(away: list[float]) -> None:
+    other = DOOR + [*away, 0.0, 0.0, 0.0, 0.0]
+    assert planned_for(other, remembered=True) == pytest.approx(other)
+
+
+@pytest.mark.parametrize("angle", [-0.9, -0.2, 0.0, 0.4])
+def test_a_door_that_is_seen_ajar_tells_by_how_much_against_where_it_was_closed(
+    angle: float,
+) -> None:
+    """Its hinge stays where it is, whatever its yaw."""
+    ajar = when_closed(MODEL, DOOR, -angle)
+    assert swung(MODEL, DOOR, ajar) == pytest.approx(angle)
+    assert hinge_distance(MODEL, DOOR, ajar) == pytest.approx(0.0, abs=1e-9)
+    assert hinge_distance(MODEL, DOOR + [0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0], ajar) == (
+        pytest.approx(0.5)
+    )

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from graph import GraphClient
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.ros.stamps import seconds
+from kmn_perception.ros.stamps import duration_of, seconds
+
+ARM = ["l_shoulder_pan_joint", "l_elbow_flex_joint"]
+STILL = 0.02  # m/s and rad/s
+
+
+def trajectory(*points: tuple[float, ...], names: Sequence[str] = ARM) -> JointTrajectory:
+    """Return a trajectory of points (time, positions)."""
+    made = [JointTrajectoryPoint(positions=p, time_from_start=duration_of(t)) for t, *p in points]
+    return JointTrajectory(joint_names=list(names), points=made)
+
+
+def time_to_rest(states: Sequence[JointState], since: float) -> float:
+    """Return how long after a time (s) the joints that are told moved for the last time."""
+    moved = [seconds(s.header.stamp) for s in states if np.abs(s.velocity).max() > STILL]
+    return max(moved) - since
 
 
 class SimClient(GraphClient):

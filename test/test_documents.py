@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import runpy
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from kmn_perception.configuration.node_parameters import parameter_table
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.rooms.sampling import KINDS
+from kmn_perception.transforms.transform import Reason
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -62,3 +64,10 @@ def test_every_kind_of_room_stands_there() -> None:
     text = (ROOT / "docs/rooms.md").read_text(encoding="utf-8")
     rows = "".join(re.findall(r"^\| (`.*?) \|", text, flags=re.MULTILINE))
     assert set(re.findall(r"`(\w+)`", rows)) == set(KINDS)
+
+
+def test_every_reason_why_a_pose_is_not_known_stands_there() -> None:
+    text = (ROOT / "docs/your_camera.md").read_text(encoding="utf-8")
+    (rows,) = re.findall(r"\| reason \| what is wrong \|\n(.*?)\n\n", text, flags=re.DOTALL)
+    stated = re.findall(r"^\| `(\w+)` \|", rows, flags=re.MULTILINE)
+    assert sorted(stated) == sorted(set(get_args(Reason)) - {"invalid"})

@@ -85,6 +85,32 @@ def test_a_checkout_where_cmake_would_fail_is_refused_at_once(name: str, tmp_pat
     assert not (tools.parent / ".venv").exists()
 
 
+def test_what_ros_has_is_not_built(tmp_path: Path) -> None:
+    """The real build script starts a stub of colcon that tells what it would build."""
+    index = tmp_path / ".venv/share/ament_index/resource_index/packages"
+    for folder in (
+        index,
+        tmp_path / "tools",
+        tmp_path / ".venv/bin",
+        tmp_path / "src/ros_interfaces",
+    ):
+        folder.mkdir(parents=True)
+    for file in ("build.sh", "environment.sh"):
+        shutil.copy(ROOT / "tools" / file, tmp_path / "tools")
+    colcon = tmp_path / ".venv/bin/colcon"
+    colcon.write_text('#!/bin/sh\necho "$@"\n')
+    colcon.chmod(0o755)
+    build = "bash tools/build.sh wheels --missing control_msgs tf2_msgs vision_msgs"
+    assert bash(build, tmp_path).stdout.endswith(
+        "--packages-select control_msgs tf2_msgs vision_msgs\n"
+    )
+    (index / "tf2_msgs").touch()
+    assert bash(build, tmp_path).stdout.endswith("--packages-select control_msgs vision_msgs\n")
+    for package in ("control_msgs", "vision_msgs"):
+        (index / package).touch()
+    assert bash(build, tmp_path).stdout == ""
+
+
 def test_files_of_numbas_cache_are_no_sources(tmp_path: Path) -> None:
     shutil.copy(ROOT / "Makefile", tmp_path)
     for package in ("kmn_msgs", "kmn_perception", "kmn_sim", "kmn_skill"):

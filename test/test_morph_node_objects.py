@@ -116,6 +116,22 @@ def test_an_object_at_the_border_is_called_cut(client: Any) -> None:
     assert 0.2 * np.sqrt(np.diag(covariance))[3:].max() > 0.02  # metres; how long is not seen
 
 
+def test_what_the_budget_leaves_out_has_messages_and_a_count(client: Any) -> None:
+    count = cartons(13)
+    before = int(client.report()["objects_left_out"])
+    assert client.set(max_objects=1).successful
+    answers = ask_all(client, cloud(13, 6500), count)
+    assert client.set(max_objects=50).successful
+    assert sorted(a.status for a in answers) == [
+        MorphingParameters.OK, *[MorphingParameters.NOT_CONVERGED] * (count - 1)
+    ]  # fmt: skip
+    left_out = [a.reason for a in answers if a.reason]
+    assert all(r.startswith(f"left out: 1 of {count} objects were") for r in left_out)
+    report = client.report()
+    assert int(report["objects_left_out"]) == before + count - 1
+    assert f"({count - 1} times)" in report["last"]
+
+
 def test_nearest_is_a_single_object_without_a_number(client: Any) -> None:
     response = client.call(client.estimation, EstimateMorphing.Request(points=cloud(13, 7000)))
     assert (response.parameters.status, response.parameters.id) == (MorphingParameters.OK, 0)

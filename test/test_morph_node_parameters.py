@@ -57,7 +57,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "crop volume reversed": ({"crop_min": [9.0, 9.0, 9.0]}, "must be below 'crop_max'"),
     "crop volume flat": ({"crop_max": [1.0, 1.0]}, "'crop_max' must be 3 finite numbers"),
     "crop volume NaN": ({"crop_max": [1.0, 1.0, NAN]}, "'crop_max' must be 3 finite"),
-    "unknown camera pose": ({"camera_pose": "sideways"}, "canonical, given, support_plane"),
+    "unknown camera pose": ({"camera_pose": "sideways"}, "auto, tf, canonical, given"),
     "no rotation": ({"camera_quaternion": [0.0] * 4}, "'camera_quaternion' must be of length 1"),
     "read-only": ({"reliability": "best_effort"}, "read-only"),
     "no world": ({"world_frame": ""}, "'world_frame' is empty"),
@@ -163,7 +163,7 @@ def given(camera: Camera) -> dict[str, list[float]]:
     [
         ("tolerance", -1.0, ParameterException, "out of range"),
         ("tolerance", "small", ParameterException, "expecting type 'DOUBLE'"),
-        ("camera_pose", "sideways", ParameterError, "must be one of canonical"),
+        ("camera_pose", "sideways", ParameterError, "must be one of auto"),
         ("model", "window", FileNotFoundError, "neither a file nor one of the shipped"),
         ("weights", "none.safetensors", WeightsError, "no weights"),
     ],

@@ -20,16 +20,18 @@ from kmn_sim.sensors.depth_camera import DepthCamera  # noqa: E402
 from kmn_sim.world.scenario import Scenario, in_room  # noqa: E402
 from kmn_sim.world.settings import WorldSettings  # noqa: E402
 from kmn_sim.world.simulation import Simulation  # noqa: E402
-from kmn_skill.experiments.settings import Experiment  # noqa: E402
+from kmn_skill.experiments.settings import Experiment, random_recesses  # noqa: E402
 
 EXPERIMENT = Experiment.load()
 MODEL = EXPERIMENT.kinematic_model(in_room=True)
 GRASP = 0.02  # metres that the gripper forgives
 
 
-def perceive(values: NDArray[np.float64], direction: str, seed: int) -> DoorEstimate:
+def perceive(
+    values: NDArray[np.float64], direction: str, seed: int, recess: float | None = None
+) -> DoorEstimate:
     """Return what is seen of a simulated door from where the robot starts."""
-    scenario = in_room(Scenario(MODEL, values, direction), seed)
+    scenario = in_room(Scenario(MODEL, values, direction), seed, recess)
     sensor = NoisySensor(DepthSensor.load("kinect_v1"), seed)
     with closing(Simulation(scenario, WorldSettings.load(), renderer="software")) as simulation:
         picture = DepthCamera(MODEL.camera, "world", sensor).expose(simulation)
@@ -42,8 +44,20 @@ def perceive(values: NDArray[np.float64], direction: str, seed: int) -> DoorEsti
 @pytest.mark.parametrize("number", [10, 62, 82])
 def test_a_lever_that_is_seen_before_the_reveal_is_no_knob(number: int) -> None:
     """Before the dark reveal beside the panel it is clearest; its length is seen on the panel."""
-    values = EXPERIMENT.random_doors(True, number + 1, 1)[number]
+    values = EXPERIMENT.random_objects(MODEL, True, number + 1, 1)[number]
     found = perceive(values, "pull", number + 1)
+    assert found.status is DoorStatus.OK, found.reason
+    assert found.handle_kind == "lever"
+
+
+@pytest.mark.parametrize("number", [22, 35, 42])
+def test_a_lever_as_bright_as_its_panel_that_reaches_before_the_reveal_is_no_knob(
+    number: int,
+) -> None:
+    """All of it is equally bright, though it shows clearly before the reveal alone."""
+    values = EXPERIMENT.random_objects(MODEL, True, 50, 41)[number]
+    recess = random_recesses("push", 50, 41)[number]
+    found = perceive(values, "push", 41 + number, recess)
     assert found.status is DoorStatus.OK, found.reason
     assert found.handle_kind == "lever"
 
@@ -52,7 +66,7 @@ def test_a_lever_that_is_seen_before_the_reveal_is_no_knob(number: int) -> None:
     ("direction", "seed"), [("pull", 2), ("pull", 6), ("push", 0), ("push", 3)]
 )
 def test_the_handle_and_the_edges_are_where_they_stand(direction: str, seed: int) -> None:
-    values = EXPERIMENT.random_doors(True, 1, seed)[0]
+    values = EXPERIMENT.random_objects(MODEL, True, 1, seed)[0]
     found = perceive(values, direction, seed)
     assert found.status is DoorStatus.OK, found.reason
     assert (found.handle_kind, found.handle_side) == ("lever", "right")

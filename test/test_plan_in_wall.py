@@ -12,7 +12,6 @@ import pytest
 from kmn_perception.model.kinematic_model import KinematicModel
 
 pytest.importorskip("pybullet")
-from kmn_sim.world.door import HANDLE_LINK, PANEL_LINK  # noqa: E402
 from kmn_sim.world.scenario import Scenario, in_room  # noqa: E402
 from kmn_sim.world.settings import WorldSettings  # noqa: E402
 from kmn_sim.world.simulation import Simulation  # noqa: E402
@@ -36,7 +35,7 @@ ROUNDING = 0.003  # metres, between the samples of the check and in pybullet's h
 
 @pytest.fixture(scope="module")
 def planner() -> Iterator[Planner]:
-    with Planner(SETUP, Prototypes.load()) as planner:
+    with Planner(SETUP, Prototypes.load("door")) as planner:
         yield planner
 
 
@@ -48,17 +47,19 @@ def nearest(plan: Plan, mode: str) -> float:
     """Return how near a robot that follows a plan comes to what stands around the door, metres."""
     scenario = in_room(Scenario(MODEL, VALUES, mode), 1, RECESS)
     with closing(Simulation(scenario, WorldSettings.load(), renderer="software")) as simulation:
-        physics, robot, door = simulation.physics, simulation.robot, simulation.door
+        physics, robot, door = simulation.physics, simulation.robot, simulation.mechanism
         assert door is not None
         names = simulation.settings.robot.finger_names
         smallest = np.inf
-        for positions, (hinge, handle) in zip(plan.positions[::4], plan.door[::4], strict=True):
+        for positions, (hinge, handle) in zip(
+            plan.positions[::4], plan.object_joints[::4], strict=True
+        ):
             for name, position in zip(plan.joint_names, positions, strict=True):
                 physics.resetJointState(robot.body, robot.link(name), position)
             for name in names:
                 physics.resetJointState(robot.body, robot.link(name), positions[-1])
-            physics.resetJointState(door.body, PANEL_LINK, hinge)
-            physics.resetJointState(door.body, HANDLE_LINK, handle)
+            physics.resetJointState(door.body, door.link("hinge"), hinge)
+            physics.resetJointState(door.body, door.link("handle"), handle)
             near = physics.getClosestPoints(robot.body, door.body, 0.05, linkIndexB=AROUND)
             smallest = min([smallest, *(point[8] for point in near)])
     return smallest

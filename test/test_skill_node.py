@@ -16,9 +16,11 @@ from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectoryPoint
 
 from kmn_msgs.action import OpenDoor
 from kmn_msgs.msg import MorphingParameters
@@ -26,21 +28,13 @@ from kmn_perception.ros.morph_node import MorphNode
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
-from door_client import CAMERA_RATE, PULL, SPEED, DoorClient  # noqa: E402
+from door_client import CAMERA_RATE, PATIENT, PULL, RELAYED, SPEED, DoorClient  # noqa: E402
+from kmn_skill.planning.robot import RobotModel  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
-SLOW = 1.0  # simulated seconds in one second
-# With so slow a camera and so fast a clock.
-PATIENT = {
-    "min_consistent_frames": 2,
-    "max_age": 20.0,
-    "door_timeout": 40.0,
-    "state_timeout": 1.0 * SPEED,
-    "start_delay": 0.3 * SPEED,
-    "part_duration": 2.0 * SPEED,
-    "part_overlap": 0.4 * SPEED,
-}
+SLOW, STEADY = 1.0, 0.3  # simulated seconds in one second
 SIMULATED_TIME = Parameter("use_sim_time", value=True)
+PR2 = RobotModel.load("pr2")
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +44,9 @@ def system(graph: Any) -> Iterator[DoorClient]:
     reliable = Parameter("reliability", value="reliable")
     graph.start(MorphNode, parameter_overrides=[SIMULATED_TIME, reliable])
     patient = [Parameter(name, value=value) for name, value in PATIENT.items()]
-    graph.start(SkillNode, parameter_overrides=[SIMULATED_TIME, *patient])
+    relayed = ["--ros-args", "-r", f"joint_states:={RELAYED}"]
+    overrides = [SIMULATED_TIME, *patient]
+    graph.start(SkillNode, parameter_overrides=overrides, cli_args=relayed)
     assert made.action.wait_for_server(30.0)
     made.graph.wait_for(lambda: made.perceived)
     yield made
@@ -76,10 +72,10 @@ def test_a_door_is_opened(system: DoorClient) -> None:
 
 
 def test_a_goal_beyond_the_joints_gets_a_clear_result(system: DoorClient) -> None:
-    assert "handle_angle = -1.5 is beyond the joint 'handle'" in system.fail(handle_angle=-1.5)
-    assert "door_angle = 2 is beyond the joint 'hinge'" in system.fail(door_angle=2.0)
-    assert "door_angle = nan is beyond" in system.fail(door_angle=math.nan)
-    assert "door_angle = 0 does not open" in system.fail(door_angle=0.0)
+    assert "-1.5 is beyond the joint 'handle'" in system.fail(handle_angle=-1.5)
+    assert "2 is beyond the joint 'hinge'" in system.fail(door_angle=2.0)
+    assert "nan is beyond" in system.fail(door_angle=math.nan)
+    assert "0 does not open" in system.fail(door_angle=0.0)
     system.assert_it_holds()
 
 
@@ -115,10 +111,40 @@ def test_after_a_cancelled_goal_the_door_is_opened_from_there(
     status, result = system.result(system.send())
     assert result.reason == ""
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)
-    assert result.attempts == 1
     assert next(f.phase for f in system.feedback if f.phase not in ("wait", "plan")) == next_phase
     assert result.door_angle < -0.8
-    system.wait_for_door(result.door_angle)
+    # A door that is let go moves a little by itself, which nobody tells.
+    system.graph.wait_for(lambda: system.doors[-1].position[0] < -0.7)
+
+
+def test_a_robot_whose_goal_is_cancelled_stands_soon(system: DoorClient) -> None:
+    """The base within 0.2 s; what its stop swings of the arm, a moment later."""
+    system.start_anew()
+    handle = system.send()
+    system.wait_for_phase("reach", 0.2)
+    with system.pace(STEADY):
+        since, _ = system.state()
+        system.wait(handle.cancel_goal_async())
+        system.assert_it_stops(since, 0.25)
+    system.result(handle)
+
+
+def test_a_robot_whose_states_are_lost_stands_0_2_s_later(system: DoorClient) -> None:
+    """Where it is then is known from what it was sent."""
+    system.start_anew()
+    handle = system.send()
+    system.wait_for_phase("reach", 0.2)
+    with system.pace(STEADY):
+        assert system.set(state_timeout=0.3).successful
+        try:
+            since, _ = system.state()
+            system.relays = False
+            system.assert_it_stops(since, 0.3 + 0.2)
+            _, result = system.result(handle)
+            assert "joint_states stopped" in result.reason or "old by its stamp" in result.reason
+        finally:
+            system.relays = True
+            assert system.set(**PATIENT).successful
 
 
 BAD: dict[str, dict[str, Any]] = {
@@ -165,19 +191,25 @@ def test_a_planner_that_was_killed_is_started_again(system: DoorClient) -> None:
 
 
 def test_a_hand_that_another_one_opens_grasps_again(system: DoorClient) -> None:
+    gripper = ActionClient(system, FollowJointTrajectory, PR2.controllers["gripper"].name)
+    assert gripper.wait_for_server(30.0)
     system.start_anew()
     handle = system.send()
     system.wait_for_phase("press")
-    let_go = JointTrajectoryPoint(positions=[0.5])
-    let_go.time_from_start.nanosec = 10**8
-    message = JointTrajectory(joint_names=["l_gripper_l_finger_joint"], points=[let_go])
     system.feedback.clear()
 
-    def plans_anew() -> bool:
-        system.trajectory.publish(message)
-        return any(feedback.phase == "plan" for feedback in system.feedback)
+    let_go = FollowJointTrajectory.Goal()
+    let_go.trajectory.joint_names = [PR2.gripper.joint]
+    let_go.trajectory.points = [JointTrajectoryPoint(positions=[PR2.planning.grip.open])]
+    let_go.trajectory.points[0].time_from_start.nanosec = 10**8
+    sent: list[Any] = []  # one after the other: the robot's next part closes the hand again
 
-    system.graph.wait_for(plans_anew)
+    def looks_again() -> bool:
+        if not sent or sent[-1].done():
+            sent.append(gripper.send_goal_async(let_go))
+        return any(feedback.phase in ("plan", "look") for feedback in system.feedback)
+
+    system.graph.wait_for(looks_again)
     _, result = system.result(handle)
     assert result.reason == ""
     assert result.success
@@ -189,7 +221,7 @@ def test_a_hand_that_another_one_opens_grasps_again(system: DoorClient) -> None:
 def test_a_simulator_that_is_reset_half_way_ends_the_goal(system: DoorClient) -> None:
     system.start_anew()
     handle = system.send()
-    system.wait_for_phase("reach", 0.2)
+    system.wait_for_phase("reach", 0.4)  # far enough from home for a jump
     system.wait(system.reset.call_async(Trigger.Request()))
     status, result = system.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)

@@ -44,7 +44,7 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     interrupt: signal.Signals, domain: int
 ) -> None:
     process = start(COMMAND, domain)
-    read_until("opening doors", process)
+    read_until("opening 'door'", process)
     started = children(process.pid)
     assert started
     process.send_signal(interrupt)
@@ -66,8 +66,7 @@ def test_a_destroyed_node_offers_its_action_no_more(graph: Any) -> None:
     action.destroy()
 
 
-def test_its_planner_has_the_model_that_it_is_given(graph: Any, tmp_path: Path) -> None:
-    """Of which the policy needs a body ``handle``, as the shipped door has it and this one not."""
+def test_a_model_that_lacks_what_its_action_grasps_is_refused(graph: Any, tmp_path: Path) -> None:
     values = yaml.safe_load(resources.find("config/models", "door").read_text())
     values["bodies"]["flap"] = values["bodies"].pop("handle")
     values["joints"]["handle"]["body"] = "flap"
@@ -75,7 +74,7 @@ def test_its_planner_has_the_model_that_it_is_given(graph: Any, tmp_path: Path) 
     file.write_text(yaml.safe_dump(values, sort_keys=False))
     given = [Parameter("model", value=str(file))]
     with (
-        pytest.raises(ConfigurationError, match="'door' must have .* move: panel, flap"),
+        pytest.raises(ConfigurationError, match="grasp: 'body' must be one of panel, flap"),
         graph.running(SkillNode, parameter_overrides=given),
     ):
         pass
@@ -85,7 +84,7 @@ def test_its_planner_has_the_model_that_it_is_given(graph: Any, tmp_path: Path) 
     ("parameter", "text"),
     [
         ("model:=elephant", "'elephant' is neither a file nor"),
-        ("model:=box_a", "'model' must be that of a door"),
+        ("model:=box_a", "'model' must be that of an object whose file has 'actions'"),
         ("retries:=-1", "retries"),
         ("world_frame:=''", "'world_frame' is empty"),
         ("surroundings:=moat", "'surroundings' must be one of none, wall"),

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rclpy.parameter import Parameter
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -80,3 +81,15 @@ def test_an_unchanged_reason_is_said_once(perception: Perception) -> None:
         "hidden by the robot",
     ]
     assert perception.report()["refused_status"] == "6"
+
+
+def test_who_measures_the_doors_angles_is_waited_for_only_where_one_is_named(graph: Any) -> None:
+    encoders = Parameter("door_angles", value="door_state")
+    graph.start(SkillNode, parameter_overrides=[encoders], namespace="/with_encoders")
+    graph.start(SkillNode, namespace="/without")
+    client = graph.start(lambda **_: GraphClient(graph, "skill_node"))
+    topics = client.get_topic_names_and_types
+    client.graph.wait_for(lambda: "/with_encoders/door_state" in dict(topics()))
+    assert client.count_subscribers("/with_encoders/door_state") == 1
+    assert client.count_subscribers("/without/joint_states") == 1
+    assert client.count_subscribers("/without/door_state") == 0

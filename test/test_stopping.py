@@ -18,7 +18,7 @@ from programs import TIMEOUT, read_until, start
 NODES = {
     "morph_node": ("kmn_perception", "estimating morphing parameters"),
     "sim_node": ("kmn_sim", "simulating model"),
-    "skill_node": ("kmn_skill", "opening doors"),
+    "skill_node": ("kmn_skill", "opening 'door'"),
 }
 TIMES = 3
 WORKING = """

@@ -1,0 +1,54 @@
+"""The page of an object of one's own: its file and all its commands, with a tiny budget."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("pybullet")
+pytest.importorskip("robotic")
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs/your_object.md").read_text(encoding="utf-8")
+LITTLE = {  # by executable; what a command has already stands before it
+    "train": "--samples 60 --epochs 1 --rounds 0",
+    "evaluate": "--samples 4",
+    "make_prototypes": "--tries 6",
+    "plan_doors": "--doors 2",
+}
+OPENING = {"evaluate": "--doors 1", "demo": "--parameters true --noise none"}
+
+
+def commands() -> list[list[str]]:
+    """Return the programs that the page runs to their end."""
+    blocks = re.findall(r"```bash\n(.*?)```", PAGE, flags=re.DOTALL)
+    lines = [line.split() for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line[0] == "./run" and "--ros-args" not in line]
+
+
+def test_the_page_leads_to_an_opened_object(tmp_path: Path) -> None:
+    (text,) = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
+    (tmp_path / "oven.yaml").write_text(text, encoding="utf-8")
+    ran = []
+    for _, package, program, *options in commands():
+        little = OPENING if package == "kmn_skill" and program in OPENING else LITTLE
+        launched = ["-m", package, program, *options, *little.get(program, "").split()]
+        done = subprocess.run(
+            [sys.executable, *launched],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=250,
+        )
+        assert done.returncode == 0, f"{launched}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+        ran.append(program)
+    assert ran == [
+        *("draw_model", "train", "evaluate"),
+        *("make_prototypes", "plan_doors", "evaluate", "demo"),
+    ]
+    for file in ("oven.png", "oven.safetensors", "oven_motions.json"):
+        assert (tmp_path / file).stat().st_size > 1000

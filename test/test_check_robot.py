@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 import yaml
 from domain_coordinator import domain_id
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from kmn_perception.configuration import resources
@@ -22,6 +24,7 @@ pytest.importorskip("robotic")
 from door_client import SEED  # noqa: E402
 from kmn_sim.ros.sim_node import SimNode  # noqa: E402
 from kmn_skill.planning.urdf_limits import JointLimits, differences, limits_of_urdf  # noqa: E402
+from kmn_skill.ros.robot_listener import RobotListener  # noqa: E402
 
 TIMEOUT = 60.0  # seconds
 NAMESPACE = "/left"
@@ -89,6 +92,19 @@ def test_of_nothing_each_thing_is_missing() -> None:
     ]
     assert printed.count("to do: ") == len(missing)
     assert "7 of 9 missing" in printed
+
+
+def test_simulated_time_that_is_found_late_counts_from_then_on(system: int) -> None:
+    """As on a busy machine: when the listening begins, nothing is known of anybody."""
+    rclpy.init(domain_id=system)
+    try:
+        listener = RobotListener(Node("late", namespace=NAMESPACE))
+        listener.listen(discovery=0.0, duration=4.0)
+        assert listener.joints.messages
+        assert max(map(abs, listener.joints.ages)) < 2.0
+        assert not listener.missing_transform("world", "base_footprint", 2.0)
+    finally:
+        rclpy.shutdown()
 
 
 def _other_controllers(values: dict[str, Any]) -> None:

@@ -31,6 +31,11 @@ class Received(NamedTuple, Generic[Message]):
     messages: list[Message]
     ages: list[float]
 
+    def clear(self) -> None:
+        """Forget all."""
+        self.messages.clear()
+        self.ages.clear()
+
     def rate(self) -> float:
         """Return how many there are a second, by their stamps."""
         stamps = [seconds(message.header.stamp) for message in self.messages]  # type: ignore[attr-defined]
@@ -63,10 +68,24 @@ class RobotListener:
 
     def listen(self, discovery: float, duration: float) -> None:
         """Find out within some seconds who is there, and listen for some more."""
-        self._spin(discovery, lambda: self._node.count_publishers("/clock") > 0)
-        if self._node.count_publishers("/clock"):
-            self._node.set_parameters([Parameter("use_sim_time", value=True)])
-            self._spin(discovery, lambda: self._node.get_clock().now().nanoseconds > 0)
+        self._spin(discovery, self._time_is_simulated)
+        self._subscribe()
+        simulated = False
+        while not simulated:
+            simulated = self._time_is_simulated()
+            if simulated:
+                self._node.set_parameters([Parameter("use_sim_time", value=True)])
+                self._spin(discovery, lambda: self._node.get_clock().now().nanoseconds > 0)
+            for received in (self.joints, self.odometry, self.cameras, self.doors):
+                received.clear()
+            self._spin(duration)
+            if not self._time_is_simulated():
+                return  # else it was found late, on a busy machine, and ages are of another clock
+
+    def _time_is_simulated(self) -> bool:
+        return self._node.count_publishers("/clock") > 0
+
+    def _subscribe(self) -> None:
         sensor = qos_profile_sensor_data
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for kind, topic, received in (
@@ -81,7 +100,6 @@ class RobotListener:
         )
         self._transforms.listen(True)
         self._find(*NOWHERE)  # a look-up that fails lets it listen to what moves, too
-        self._spin(duration)
 
     def missing_transform(self, target: str, source: str, max_age: float) -> str:
         """Return why it is not known where a frame (``source``) was of late; empty if it is."""

@@ -196,6 +196,7 @@ class DoorPipeline:
         if not view.in_world:
             points = transform_points(camera.pose, points)
         estimate = Estimate(
+            model=self.model,
             theta=theta,
             gamma=gamma,
             covariance=covariance,

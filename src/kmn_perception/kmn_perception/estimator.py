@@ -89,8 +89,8 @@ class Estimate:
 
     Attributes
     ----------
-    theta, gamma
-        (n,) and (m,) morphing parameters, metres, radians and scales.
+    model, theta, gamma
+        The model, and its (n,) and (m,) morphing parameters, metres, radians and scales.
     covariance
         (n + m, n + m) over (theta, gamma); NaN without refinement.
     transform
@@ -113,6 +113,7 @@ class Estimate:
         What the frame tells about an error of the sensor, for people to read.
     """
 
+    model: KinematicModel
     theta: NDArray[np.float64]
     gamma: NDArray[np.float64]
     covariance: NDArray[np.float64]
@@ -134,6 +135,7 @@ class Estimate:
         """Return the estimate that says why there is none."""
         n, m = len(model.theta), len(model.gamma)
         return cls(
+            model=model,
             theta=np.full(n, np.nan),
             gamma=np.full(m, np.nan),
             covariance=np.full((n + m, n + m), np.nan),
@@ -183,6 +185,15 @@ class MorphEstimator:
         file = weights_file or weights.default_file(kinematic_model)
         network = weights.load(file, kinematic_model).network
         return cls(kinematic_model, network, settings, RefinementSettings.load())
+
+    @property
+    def models(self) -> tuple[KinematicModel, ...]:
+        """The one model."""
+        return (self.model,)
+
+    def configured(self, settings: EstimatorSettings) -> MorphEstimator:
+        """Return the estimator with other settings, which shares model and network."""
+        return MorphEstimator(self.model, self.network, settings, self.refinement)
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
@@ -239,10 +250,10 @@ class MorphEstimator:
             doubt = self._doubt(change)
         theta, gamma = model.split(values)
         distances = surface_distances(model.unit_cubes(theta, gamma), points)
-        shares = (0.5, self.settings.deviation_share)
-        residual, deviation = np.quantile(distances, shares).tolist()
+        residual, deviation = np.quantile(distances, (0.5, self.settings.deviation_share)).tolist()
         status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(
+            model=model,
             theta=theta,
             gamma=gamma,
             covariance=covariance,

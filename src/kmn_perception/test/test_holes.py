@@ -36,7 +36,7 @@ def holes(kind: str, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 @pytest.mark.parametrize("kind", ["0.4", "0.6", "0.8", "checkerboard", "rows"])
 def test_a_door_with_holes_all_over_is_found(kind: str) -> None:
-    model = pipeline().estimator.model
+    model = pipeline().model
     depth = render(model.unit_cubes(*model.split(VALUES)), model.camera)
     depth[holes(kind, depth.shape)] = np.nan
     found = pipeline().estimate(DepthView.of_depth(depth, model.camera))

@@ -17,7 +17,7 @@ def drawn(**theta: float) -> list[list[float]]:
     values = np.array([theta.get(parameter.name, 0.0) for parameter in BOX.theta])
     estimate = Estimate.none(BOX, 0, Status.NOT_CONVERGED, "no fit")
     bodies = BOX.unit_cubes(values, np.zeros(len(BOX.gamma)))
-    _, *cubes = markers_from_estimates("box", [(estimate, bodies)], Header()).markers
+    _, *cubes = markers_from_estimates([(estimate, bodies)], Header()).markers
     return [[cube.scale.x, cube.scale.y, cube.scale.z] for cube in cubes]
 
 

@@ -63,7 +63,7 @@ def estimate(
     proud: float | None = None,
 ) -> ObjectEstimate:
     """Return what is found of a door with such a handle, and with a frame that is so far proud."""
-    model = pipeline().estimator.model
+    model = pipeline().model
     theta, gamma = model.split(values)
     panel, lever = model.unit_cubes(np.zeros(len(theta)), gamma)
     around = [] if proud is None else frame(panel, proud)
@@ -75,7 +75,7 @@ def estimate(
 
 def doors() -> list[NDArray[np.float64]]:
     """Return doors (n + m,) that are drawn as those of the evaluation are."""
-    model = pipeline().estimator.model
+    model = pipeline().model
     return list(model.sample(np.random.default_rng(0), SCENES))
 
 

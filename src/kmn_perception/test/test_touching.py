@@ -32,7 +32,7 @@ def slid_up_to(carton: UprightBox, x: float) -> UprightBox:
 @pytest.mark.parametrize(("name", "side"), [("learn12", 1), ("learn15", 1), ("learn15", -1)])
 def test_an_end_hidden_by_what_touches_a_carton_is_stated_as_open(name: str, side: int) -> None:
     pipeline = load_pipeline(TABLETOP)
-    model = pipeline.estimator.model
+    model = pipeline.model
     (frame,) = (f for f in read_frames(share_directory() / "data/kinect_boxes") if f.name == name)
     references = measure(frame, SETTINGS, model.camera.pose)
     (carton,) = (r.box for r in references.boxes if r.label == LABEL)
@@ -61,7 +61,7 @@ def test_two_that_seem_one_are_not_stated_as_one_box(name: str) -> None:
     """A box of nearly the same height stands behind a carton and reaches out by 3 cm beside it."""
     pipeline = load_pipeline(TABLETOP)
     (frame,) = (f for f in read_frames(share_directory() / "data/kinect_boxes") if f.name == name)
-    references = measure(frame, SETTINGS, pipeline.estimator.model.camera.pose)
+    references = measure(frame, SETTINGS, pipeline.model.camera.pose)
     long = max((r.box for r in references.boxes), key=lambda box: box.size[:2].max())
     along = long if long.size[0] > long.size[1] else long.turned(1)
     level = along.turned(2) if np.cos(along.yaw) < 0.0 else along

@@ -24,7 +24,7 @@ def pipeline() -> MorphPipeline:
 
 @pytest.mark.parametrize("rows", [0, 1, 3, 8])
 def test_rows_without_measurements_do_not_hide_that_the_top_is_out_of_view(rows: int) -> None:
-    model = pipeline().estimator.model
+    model = pipeline().model
     depth = render(model.unit_cubes(THETA, GAMMA), model.camera)
     depth[:rows] = np.nan
     (found,) = pipeline().estimate_all(DepthView.of_depth(depth, model.camera), 1)
@@ -36,7 +36,7 @@ def test_rows_without_measurements_do_not_hide_that_the_top_is_out_of_view(rows:
 
 
 def test_a_door_wholly_in_view_is_not_truncated_by_rows_without_measurements() -> None:
-    model = pipeline().estimator.model
+    model = pipeline().model
     depth = render(model.unit_cubes([0.3, 0.0, 0.2], [0.0] * 4), model.camera)
     depth[:3] = depth[-3:] = np.nan
     (found,) = pipeline().estimate_all(DepthView.of_depth(depth, model.camera), 1)

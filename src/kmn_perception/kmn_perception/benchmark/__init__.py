@@ -15,7 +15,6 @@ from kmn_perception.command_line.arguments import output_file, whole_number, wri
 from kmn_perception.command_line.columns import columns
 from kmn_perception.estimator import MorphEstimator
 from kmn_perception.network.threads import use_one_thread
-from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.parameters import declare_parameters
 from kmn_perception.ros.program import own_arguments, ros_session
@@ -42,7 +41,7 @@ def benchmark(node: Node, frames: int) -> dict[str, Any]:
     use_one_thread()
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
     cloud = full_cloud(estimator.model)
-    chain, points = stages.chain(MorphPipeline(estimator, settings.pipeline), settings, cloud)
+    chain, points = stages.chain(estimator, settings, cloud)
     print(
         f"{estimator.model.name}: {points} points of {cloud.width} x {cloud.height}; "
         "torch on 1 thread"

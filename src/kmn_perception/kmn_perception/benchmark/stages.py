@@ -10,6 +10,7 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2
 from tqdm import tqdm
 
+from kmn_perception.estimator import MorphEstimator
 from kmn_perception.network.morph import predict
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.refinement import refine
@@ -26,7 +27,7 @@ Stage = Callable[[], object]
 
 
 def chain(
-    pipeline: MorphPipeline, settings: MorphNodeSettings, cloud: PointCloud2
+    estimator: MorphEstimator, settings: MorphNodeSettings, cloud: PointCloud2
 ) -> tuple[dict[str, Stage], int]:
     """Return the stages that a cloud goes through, and the number of the object's points.
 
@@ -35,8 +36,8 @@ def chain(
     ValueError
         If no object is found in the cloud.
     """
-    estimator = pipeline.estimator
     model, network = estimator.model, estimator.network
+    pipeline = MorphPipeline(estimator, settings.pipeline)
     # Without a tolerance all steps are made, as for an object that converges late.
     estimator.settings = dataclasses.replace(settings.estimator, iterations=STEPS, tolerance=0.0)
 
@@ -45,8 +46,8 @@ def chain(
 
     def callback() -> None:
         estimate = pipeline.estimate(message_to_view())
-        parameters_from_estimate(model, estimate, cloud.header)
-        markers_from_estimates(model.name, [(estimate, pipeline.bodies(estimate))], cloud.header)
+        parameters_from_estimate(estimate, cloud.header)
+        markers_from_estimates([(estimate, pipeline.bodies(estimate))], cloud.header)
 
     view = message_to_view()
     views = pipeline.observe(view, 1)

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping
+from dataclasses import fields
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import Section
@@ -18,6 +19,8 @@ from kmn_perception.configuration.section import Section
 TYPES = {"bool": bool, "int": int, "double": float, "string": str, "double_array": list}
 BOUNDS, ONE_OF, FIXED_SIZE, NOT_EMPTY = "bounds<>", "one_of<>", "fixed_size<>", "not_empty<>"
 WIDTH = 96  # of a text for the terminal
+
+Settings = TypeVar("Settings")
 
 
 class ParameterError(ValueError):
@@ -133,6 +136,13 @@ def check_values(node: str, values: Mapping[str, Any]) -> None:
     """Raise a `ParameterError` if one of some values by name is not valid."""
     for name, parameter in load_node_parameters(node).items():
         parameter.check(values[name])
+
+
+def pick(kind: type[Settings], values: Mapping[str, Any], prefix: str = "") -> Settings:
+    """Make settings, a dataclass, of the parameters that are named as its fields."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    picked = {name: values[prefix + name] for name in names}
+    return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in picked.items()})
 
 
 def describe_parameters(node: str) -> str:

@@ -78,7 +78,7 @@ def _report(options: argparse.Namespace) -> None:
     print("", details(summary), sep="\n")
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        overlays = draw(results, pipeline.estimator.model)
+        overlays = draw(results, pipeline.model)
         print(f"pictures: {save_pictures(overlays, len(results), options.out)}")
     if options.json:
         write_json(options.json, summary)

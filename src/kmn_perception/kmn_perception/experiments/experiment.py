@@ -82,7 +82,7 @@ def run(
     frames: Sequence[LabelledFrame], pipeline: MorphPipeline, settings: ExperimentSettings
 ) -> Iterator[FrameResult]:
     """Yield the result of each frame."""
-    model = pipeline.estimator.model
+    model = pipeline.model
     paper = weights.load(f"paper/{model.name}", model).network
     for number, frame in enumerate(frames):
         yield _run(frame, pipeline, paper, settings, np.random.default_rng(number))
@@ -95,7 +95,7 @@ def _run(
     settings: ExperimentSettings,
     generator: np.random.Generator,
 ) -> FrameResult:
-    model = pipeline.estimator.model
+    model = pipeline.model
     references = measure(frame, settings, model.camera.pose)
     view = DepthView.of_depth(frame.depth, frame.camera(settings))
     objects, seconds = _estimate(view, pipeline, settings.repetitions)
@@ -153,7 +153,7 @@ def _estimate(
 
 def _detection(found: ObjectEstimate, pipeline: MorphPipeline) -> Detection:
     estimate = found.estimate
-    cube = pipeline.estimator.model.unit_cubes(estimate.theta, estimate.gamma)[0]
+    cube = pipeline.model.unit_cubes(estimate.theta, estimate.gamma)[0]
     values = np.concatenate([estimate.theta, estimate.gamma])
     return Detection(box_of_cube(cube), values, estimate.covariance)
 

@@ -33,9 +33,7 @@ class FrameEstimates(NamedTuple):
     def parameters(self) -> list[MorphingParameters]:
         """Return the message of each object."""
         return [
-            parameters_from_estimate(
-                self.pipeline.model, found.estimate, self.header, found.number, found.truncated
-            )
+            parameters_from_estimate(found.estimate, self.header, found.number, found.truncated)
             for found in self.objects
         ]
 
@@ -52,4 +50,4 @@ class FrameEstimates(NamedTuple):
         """Return the message that shows all objects."""
         bodies = self.pipeline.bodies
         drawn = [(found.estimate, bodies(found.estimate)) for found in self.objects]
-        return markers_from_estimates(self.pipeline.model.name, drawn, self.header)
+        return markers_from_estimates(drawn, self.header)

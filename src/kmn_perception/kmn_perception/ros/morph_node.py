@@ -142,12 +142,8 @@ class MorphNode(OverridableNode):
                 for parameters in answer.parameters():
                     self._parameters_publisher.publish(parameters)
                 self._model_publisher.publish(answer.markers())
-                self._objects.publish(
-                    answer.pipeline.model,
-                    answer.holding(),
-                    answer.header,
-                    self._active.settings.description_change,
-                )
+                max_change = self._active.settings.description_change
+                self._objects.publish(answer.holding(), answer.header, max_change)
 
     def _answer(self, frame: Frame, all_objects: bool, is_single: bool = False) -> FrameEstimates:
         """Estimate a frame; whatever is wrong with it becomes the reason of the answer.

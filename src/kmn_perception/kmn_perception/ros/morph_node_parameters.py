@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.configuration.node_parameters import ParameterError
+from kmn_perception.configuration.node_parameters import ParameterError, pick
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.rotation import matrix_from_quaternion
 from kmn_perception.pipeline_interface import CalibrationState, FrameBudget, PipelineSettings
-from kmn_perception.ros.parameters import pick
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.segmentation import SegmentationSettings
 from kmn_perception.scene.settings import SceneSettings

@@ -14,7 +14,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 from vision_msgs.msg import Detection3DArray
 
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.object_urdf import object_urdf
 from kmn_perception.ros.messages import objects as messages
 
@@ -42,7 +41,6 @@ class ObjectPublisher:
 
     def publish(
         self,
-        model: KinematicModel,
         objects: Sequence[tuple[int, Estimate, NDArray[np.float64]]],
         header: Header,
         max_change: float,
@@ -56,18 +54,19 @@ class ObjectPublisher:
         max_change
             Largest distance between bodies and those of the description, metres.
         """
-        self._detections.publish(messages.detections_from_estimates(model, objects, header))
+        self._detections.publish(messages.detections_from_estimates(objects, header))
         if not objects:
             return
         _, estimate, _ = objects[0]
+        model = estimate.model
         for action in model.actions[:1]:
-            self._handle.publish(messages.handle_pose(model, action, estimate, header))
+            self._handle.publish(messages.handle_pose(action, estimate, header))
         closed = estimate.transform @ model.unit_cubes(np.zeros(len(model.theta)), estimate.gamma)
         if self._is_another(model.name + header.frame_id, closed, max_change):
             text = object_urdf(model, estimate.transform, estimate.gamma, header.frame_id)
             self._description.publish(String(data=text))
         if model.joints:
-            self._states.publish(messages.joint_states(model, estimate, header))
+            self._states.publish(messages.joint_states(estimate, header))
 
     def _is_another(self, name: str, cubes: NDArray[np.float64], max_change: float) -> bool:
         """Tell whether the bodies (B, 4, 4) of the closed object are not those described."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import difflib
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
@@ -18,8 +17,6 @@ from kmn_perception.configuration.node_parameters import (
     check_values,
     load_node_parameters,
 )
-
-Settings = TypeVar("Settings")
 
 
 def declare_parameters(node: Node, stated: str) -> dict[str, Any]:
@@ -70,13 +67,6 @@ def foreign_parameters(node: Node) -> list[str]:
             hint = f"; did you mean '{near[0]}'?" if near else ""
             texts.append(f"there is no parameter '{name}', its value is ignored{hint}")
     return texts
-
-
-def pick(kind: type[Settings], values: Mapping[str, Any], prefix: str = "") -> Settings:
-    """Make settings, a dataclass, of the parameters that are named as its fields."""
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    picked = {name: values[prefix + name] for name in names}
-    return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in picked.items()})
 
 
 def request_to_set(values: Mapping[str, Any]) -> SetParametersAtomically.Request:

@@ -61,7 +61,6 @@ def scene_of(
     frame: Frame, camera: Camera, pipeline: MorphPipeline
 ) -> tuple[Camera, NDArray[np.float64]] | None:
     """Return the camera, with its pose, and the box's cuboids (B, 4, 4), None if not found."""
-    estimator = pipeline.estimator
     points = depth_to_points(frame.depth, camera)
     try:
         pose = pipeline.camera_pose(DepthView(points, camera))
@@ -70,10 +69,10 @@ def scene_of(
     camera = replace(camera, pose=pose)
     seen = points[frame.box & np.isfinite(frame.depth)] @ pose[:3, :3].T + pose[:3, 3]
     floor = pipeline.settings.background.plane_margin
-    estimate = estimator.estimate(Observation(seen.astype(np.float32), camera, floor))
+    estimate = pipeline.estimator.estimate(Observation(seen.astype(np.float32), camera, floor))
     if estimate.status != Status.OK:
         return None
-    return camera, estimator.model.unit_cubes(estimate.theta, estimate.gamma)
+    return camera, pipeline.bodies(estimate)
 
 
 def simulate(

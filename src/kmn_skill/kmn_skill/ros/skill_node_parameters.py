@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from kmn_perception.configuration.node_parameters import ParameterError
+from kmn_perception.configuration.node_parameters import ParameterError, pick
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.parts import PRISMATIC
-from kmn_perception.ros.parameters import pick
 from kmn_skill.execution.base_motion import TrackingSettings
 from kmn_skill.execution.held_door import GripSettings
 from kmn_skill.execution.opening_settings import OpeningSettings

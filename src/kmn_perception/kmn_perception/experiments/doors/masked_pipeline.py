@@ -33,7 +33,7 @@ def masked_pipeline(
     camera = frame.description.camera
     depth = np.where(panel_mask(label, camera), frame.depth, np.float32(np.nan))
     pose = label.camera_pose.copy()
-    pose[0, 3] += pipeline.estimator.model.camera.position[0]  # the model's doors are about x = 0
+    pose[0, 3] += pipeline.model.camera.position[0]  # the model's doors are about x = 0
     placed = pose
     if label.handle_side == "left":
         depth = np.ascontiguousarray(depth[:, ::-1])

@@ -38,9 +38,7 @@ CORNERS = np.array([[x, y, z, 2.0] for x in (-1, 1) for y in (-1, 1) for z in (-
 
 
 def detections_from_estimates(
-    model: KinematicModel,
-    objects: Sequence[tuple[int, Estimate, NDArray[np.float64]]],
-    header: Header,
+    objects: Sequence[tuple[int, Estimate, NDArray[np.float64]]], header: Header
 ) -> Detection3DArray:
     """Make the message of all objects; only those whose parameters hold belong into it.
 
@@ -57,7 +55,7 @@ def detections_from_estimates(
             Detection3D(
                 header=header,
                 id=str(number),
-                results=[_hypothesis(model, estimate)],
+                results=[_hypothesis(estimate)],
                 bbox=_bounding_box(estimate, bodies),
             )
             for number, estimate, bodies in objects
@@ -65,9 +63,7 @@ def detections_from_estimates(
     )
 
 
-def handle_pose(
-    model: KinematicModel, action: Action, estimate: Estimate, header: Header
-) -> PoseStamped:
+def handle_pose(action: Action, estimate: Estimate, header: Header) -> PoseStamped:
     """Return where the middle of what an action grasps is, with the axes of the object.
 
     It moves with the joint that is meant, but not with the one that unlatches it: the pose is that
@@ -77,21 +73,22 @@ def handle_pose(
     if action.unlatch is not None:
         angles[action.unlatch.name] = 0.0
     body = action.grasp.body
-    moved = estimate.transform @ model.motions(estimate.gamma, angles)[body.name]
+    moved = estimate.transform @ estimate.model.motions(estimate.gamma, angles)[body.name]
     pose, _ = rigid_pose(moved)
     pose[:3, 3] = moved[:3] @ [*body.centre(estimate.gamma), 1.0]
     return PoseStamped(header=header, pose=_pose(pose))
 
 
-def joint_states(model: KinematicModel, estimate: Estimate, header: Header) -> JointState:
-    """Return the angles of the model's joints; 0 where they are not estimated."""
+def joint_states(estimate: Estimate, header: Header) -> JointState:
+    """Return the angles of the object's joints; 0 where they are not estimated."""
     angles = {joint.name: joint.value for joint in estimate.joints}
-    names = [joint.name for joint in model.joints if joint.moves]
+    names = [joint.name for joint in estimate.model.joints if joint.moves]
     return JointState(header=header, name=names, position=[angles.get(n, 0.0) for n in names])
 
 
-def _hypothesis(model: KinematicModel, estimate: Estimate) -> ObjectHypothesisWithPose:
+def _hypothesis(estimate: Estimate) -> ObjectHypothesisWithPose:
     pose, _ = rigid_pose(estimate.transform)
+    model = estimate.model
     theta, count = estimate.theta, len(estimate.theta)
     slopes = np.array([_change(model, theta, step) / STEP for step in STEP * np.eye(count)]).T
     covariance = slopes @ estimate.covariance[:count, :count] @ slopes.T

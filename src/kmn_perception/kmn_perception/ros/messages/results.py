@@ -12,7 +12,6 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rotation import quaternion_from_matrix
 
 if TYPE_CHECKING:  # the estimator brings torch, which those who only read clouds do not need
@@ -23,7 +22,6 @@ INVALID_COLOUR = ColorRGBA(r=0.94, g=0.38, b=0.24, a=0.5)
 
 
 def parameters_from_estimate(
-    model: KinematicModel,
     estimate: Estimate,
     header: Header,
     number: int = 0,
@@ -38,6 +36,7 @@ def parameters_from_estimate(
     truncated
         Whether the object goes on beyond the image's border.
     """
+    model = estimate.model
     return MorphingParameters(
         header=header,
         model=model.name,
@@ -67,26 +66,25 @@ def parameters_from_estimate(
 
 
 def markers_from_estimates(
-    name: str, objects: Sequence[tuple[Estimate, NDArray[np.float64]]], header: Header
+    objects: Sequence[tuple[Estimate, NDArray[np.float64]]], header: Header
 ) -> MarkerArray:
-    """Draw the bodies of the estimated models as cubes, which replace the former ones.
+    """Draw the bodies of the estimated models as cubes, which replace all former ones.
 
     They are green where the parameters hold, else red; there is none of a body without a size.
 
     Parameters
     ----------
-    name
-        Of the model.
     objects
         For each object its estimate and its bodies (B, 4, 4), see `KinematicModel.unit_cubes`.
     """
-    markers = [Marker(header=header, ns=name, action=Marker.DELETEALL)]
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
     for estimate, cubes in objects:
         holds = estimate.status in (MorphingParameters.OK, MorphingParameters.HANDLE_NOT_SEEN)
         colour = VALID_COLOUR if holds else INVALID_COLOUR
         for cube in cubes:
             if cube[:3, :3].any(axis=0).all():
-                markers.append(cube_marker(name, len(markers) - 1, cube, colour, header))
+                number = len(markers) - 1
+                markers.append(cube_marker(estimate.model.name, number, cube, colour, header))
     return MarkerArray(markers=markers)
 
 

@@ -18,7 +18,7 @@ TIERS = {
         ("command_line", "model"),
         ("scene", "network", "refinement", "rooms", "transforms"),
         ("estimator", "doors"),
-        ("pipeline_interface",),
+        ("pipeline_interface", "model_choice"),
         ("pipeline", "door_pipeline"),
         ("training", "visualization"),
         ("evaluation",),

@@ -10,6 +10,7 @@ EXECUTABLES = {
     "train_doors": ("kmn_perception.training.train_doors", "training"),
     "draw_model": ("kmn_perception.visualization.draw_model", ""),
     "evaluate": ("kmn_perception.evaluation.evaluate", "evaluation"),
+    "evaluate_models": ("kmn_perception.evaluation.evaluate_models", ""),
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "evaluate_fusion": ("kmn_perception.evaluation.doors.evaluate_fusion", ""),

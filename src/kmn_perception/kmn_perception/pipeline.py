@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.frame_fusion import FrameFusion
-from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimator import Estimate, EstimatorSettings, Status
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render
-from kmn_perception.pipeline_interface import ObjectEstimate, PipelineSettings
+from kmn_perception.pipeline_interface import Estimator, ObjectEstimate, PipelineSettings
 from kmn_perception.scene.camera_pose import NoCameraPoseError, find_camera_pose
 from kmn_perception.scene.connected_pixels import share_of_holes
 from kmn_perception.scene.depth_view import DepthView
@@ -27,7 +27,7 @@ from kmn_perception.scene.standing import Standing, find_standing
 from kmn_perception.scene.support_plane import find_support_plane
 
 MIN_PARTS = 3  # two parts of an object, and what is in front of them
-TOGETHER = 4  # objects that are predicted at once, between two looks at the clock
+TOGETHER = 4  # objects, times models, that are estimated between two looks at the clock
 
 
 class MorphPipeline:
@@ -39,13 +39,13 @@ class MorphPipeline:
         May be replaced between two estimates.
     """
 
-    def __init__(self, estimator: MorphEstimator, settings: PipelineSettings) -> None:
+    def __init__(self, estimator: Estimator, settings: PipelineSettings) -> None:
         self.estimator, self.settings = estimator, settings
 
     @property
     def model(self) -> KinematicModel:
-        """What is estimated."""
-        return self.estimator.model
+        """What is estimated; of several models the first."""
+        return self.estimator.models[0]
 
     @property
     def uses_image(self) -> bool:
@@ -53,14 +53,12 @@ class MorphPipeline:
         return False
 
     def configured(self, settings: PipelineSettings, estimator: EstimatorSettings) -> MorphPipeline:
-        """Return the pipeline with other settings, which shares model and network."""
-        old = self.estimator
-        new = MorphEstimator(old.model, old.network, estimator, old.refinement)
-        return MorphPipeline(new, settings)
+        """Return the pipeline with other settings, which shares models and networks."""
+        return MorphPipeline(self.estimator.configured(estimator), settings)
 
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
-        model, scene = self.estimator.model, self.settings.scene
+        model, scene = self.model, self.settings.scene
         points = depth_to_points(render(model.prototype_cubes, model.camera), model.camera)
         find_support_plane(points, self.settings.plane)
         # At any angle that is not 0 the surface's rounding errors have concave edges.
@@ -128,24 +126,25 @@ class MorphPipeline:
 
     def camera_pose(self, view: DepthView) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the optical frame in the world, see `find_camera_pose`."""
-        settings, canonical = self.settings, self.estimator.model.camera.pose
-        source = settings.camera_pose
+        settings, source = self.settings, self.settings.camera_pose
+        poses = [model.camera.pose for model in self.estimator.models]
+        canonical = poses[0] if all(np.array_equal(pose, poses[0]) for pose in poses) else None
         return find_camera_pose(view, source, settings.given_pose, canonical, settings.plane)
 
     def _nothing(self, view: DepthView, reason: str) -> ObjectEstimate:
         """Return what a frame without an object holds."""
-        model = self.estimator.model
-        none = Estimate.none(model, 0, Status.NO_OBJECT, reason)
-        empty = Observation(np.empty((0, 3), np.float32), model.camera)
+        none = Estimate.none(self.model, 0, Status.NO_OBJECT, reason)
+        empty = Observation(np.empty((0, 3), np.float32), self.model.camera)
         return ObjectEstimate(none, empty, np.zeros_like(view.valid), False)
 
     def _estimated(self, views: Sequence[ObjectView], end: float) -> list[ObjectEstimate]:
         """Estimate the objects one after another, as many as the budget of the frame allows for."""
         budget, objects = self.settings.budget, list[ObjectEstimate]()
-        for first in range(0, min(len(views), budget.objects), TOGETHER):
+        together = max(TOGETHER // len(self.estimator.models), 1)
+        for first in range(0, min(len(views), budget.objects), together):
             if first > 0 and time.monotonic() > end:
                 break
-            some = views[first : min(first + TOGETHER, budget.objects)]
+            some = views[first : min(first + together, budget.objects)]
             estimates = self.estimator.estimate_all([view.observation for view in some])
             objects += [ObjectEstimate(e, *view) for e, view in zip(estimates, some, strict=True)]
         reason = f"{len(objects)} of {len(views)} objects were estimated"
@@ -235,7 +234,7 @@ class MorphPipeline:
         """Return the bodies (B, 4, 4) of an estimate, none where there are no parameters."""
         if not np.isfinite([*estimate.theta, *estimate.gamma]).all():
             return np.empty((0, 4, 4))
-        return self.model.unit_cubes(estimate.theta, estimate.gamma)
+        return estimate.model.unit_cubes(estimate.theta, estimate.gamma)
 
     def _likely_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
         """Return the bodies (B, 4, 4) of an estimate that lies on the points, OK or not."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, Protocol
@@ -102,12 +103,36 @@ class ObjectEstimate(NamedTuple):
     left_out: bool = False
 
 
+class Estimator(Protocol):
+    """Explains single objects by one model, or by the best of several."""
+
+    @property
+    def models(self) -> tuple[KinematicModel, ...]:
+        """By which objects are explained."""
+
+    @property
+    def settings(self) -> EstimatorSettings:
+        """Of all models."""
+
+    def warm_up(self) -> None:
+        """Compile and load all that the first estimate needs, so that it is not slow."""
+
+    def estimate(self, observation: Observation) -> Estimate:
+        """Estimate the morphing parameters of an object from points that show nothing else."""
+
+    def estimate_all(self, observations: Sequence[Observation]) -> list[Estimate]:
+        """Estimate the morphing parameters of several objects."""
+
+    def configured(self, settings: EstimatorSettings) -> Estimator:
+        """Return the estimator with other settings, which shares what was loaded."""
+
+
 class Pipeline(Protocol):
-    """From a frame to estimates of one model, as morph_node needs it."""
+    """From a frame to estimates, as morph_node needs it."""
 
     @property
     def model(self) -> KinematicModel:
-        """What is estimated."""
+        """What is estimated; of several models the first."""
 
     @property
     def uses_image(self) -> bool:

@@ -72,6 +72,19 @@ def refine(
     return _refined(model, problem, observation.points, values, [values])
 
 
+def fit_once(
+    model: KinematicModel,
+    observation: Observation,
+    values: NDArray[np.float64],
+    settings: RefinementSettings,
+) -> NDArray[np.float64]:
+    """Return the fit (P,) from one start (P,), neither judged nor with a covariance."""
+    problem = Problem.of(model, observation, settings)
+    return (
+        values if len(problem.image.pixels) < settings.min_points else fit(problem, values).values
+    )
+
+
 def refine_from_scratch(
     model: KinematicModel, observation: Observation, settings: RefinementSettings
 ) -> Refinement:

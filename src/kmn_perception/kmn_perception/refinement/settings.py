@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -156,6 +157,31 @@ class MisfitSettings(NamedTuple):
 
 
 @dataclass(frozen=True)
+class EvidenceSettings:
+    """The measure by which models are compared.
+
+    Attributes
+    ----------
+    model_error
+        Standard deviation by which depths may differ from those of the right model, metres.
+    robust
+        Standard deviations from which on a depth is as wrong as it can be.
+    correlated_pixels
+        Number of pixels that count as one measurement.
+    equal
+        Models whose log-evidences differ by less explain an observation equally well.
+    hopeless
+        Misfit of the network's estimate above which a model is not fitted where another one is OK.
+    """
+
+    model_error: Positive
+    robust: Annotated[float, Field(ge=1.0)]
+    correlated_pixels: Count
+    equal: NonNegative
+    hopeless: NonNegative
+
+
+@dataclass(frozen=True)
 class StartSettings:
     """Other starts than the estimate.
 
@@ -220,7 +246,8 @@ class RefinementSettings:
         Approximate number of observed pixels from which the object's distance is taken.
     correlated_rows
         Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
-    search, reacquisition, support, curvature, fine, edges, occlusion, misfit, starts, unobservable
+    search, reacquisition, support, curvature, fine, edges, occlusion, misfit, evidence, starts,
+    unobservable
         Settings of the parts.
     damping
         Information that damps the steps, per squared pixel of movement.
@@ -245,12 +272,19 @@ class RefinementSettings:
     edges: EdgeSettings
     occlusion: OcclusionSettings
     misfit: MisfitSettings
+    evidence: EvidenceSettings
     starts: StartSettings
     unobservable: UnobservableSettings
     damping: NonNegative
     limit_margin: NonNegative
     limit_softness: Annotated[float, Field(gt=0.0, le=1.0)]
     agreement: NonNegative
+
+    def without_retries(self) -> RefinementSettings:
+        """Return the settings of a fit that is given up where other starts would be tried."""
+        reject_above = min(self.misfit.reject_above, self.misfit.retry_above)
+        misfit = self.misfit._replace(retry_above=math.inf, reject_above=reject_above)
+        return replace(self, misfit=misfit)
 
     @classmethod
     def load(cls, path: Path | None = None) -> RefinementSettings:

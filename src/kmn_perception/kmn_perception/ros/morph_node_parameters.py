@@ -26,7 +26,7 @@ class MorphNodeSettings:
     Attributes
     ----------
     model, weights
-        As for `MorphEstimator.load`.
+        As for `MorphEstimator.load`; of several models, separated by commas.
     world_frame
         Frame of the parameters; clouds in it need no camera pose.
     support_frame

@@ -38,7 +38,7 @@ def find_camera_pose(
     view: DepthView,
     source: CameraPose,
     given: NDArray[np.float64],
-    canonical: NDArray[np.float64],
+    canonical: NDArray[np.float64] | None,
     plane_settings: SupportPlaneSettings,
 ) -> NDArray[np.float64]:
     """Return the pose (4, 4) of the optical frame in the world frame.
@@ -46,17 +46,24 @@ def find_camera_pose(
     Parameters
     ----------
     given, canonical
-        (4, 4) the user's pose, and that of the model's canonical camera.
+        (4, 4) the user's pose, and that of the model's canonical camera; ``None`` where several
+        models have different ones.
 
     Raises
     ------
     NoCameraPoseError
-        If it is to be found from the support plane, and there is none.
+        If it is to be found from the support plane, and there is none, or if it needs a canonical
+        camera, and there is none.
     """
     if view.pose is not None and not view.in_world:
         return view.pose
     if source is CameraPose.GIVEN and not view.in_world:
         return given
+    if canonical is None:
+        raise NoCameraPoseError(
+            "the models have different canonical cameras: the pose of the camera must be given or "
+            "come from transforms, and points be in the camera's frame"
+        )
     if view.in_world or source is not CameraPose.SUPPORT_PLANE:
         return canonical
     plane = find_support_plane(view.points, plane_settings)

@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
 from kmn_msgs.action import OpenDoor, OperateJoint
+from kmn_msgs.msg import MorphingParameters
 from kmn_perception.configuration import resources
 
 pytest.importorskip("pybullet")
@@ -74,6 +75,20 @@ def test_what_cannot_be_asked_of_it_is_said(
     status, result = system.move(**goal)
     assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, result.INVALID_GOAL)
     assert reason in result.reason
+
+
+def test_a_drawer_is_not_what_perception_tells_to_be_another_object(system: DrawerClient) -> None:
+    """The object that is asked for is a lid, of another model of the same morph_node."""
+    assert system.set(door_timeout=4.0).successful
+    told = MorphingParameters(model="lid", id=7, status=MorphingParameters.OK)
+    told.header.frame_id = "world"
+    timer = system.create_timer(0.1, lambda: system.parameters.publish(told))
+    status, result = system.move(object_id=7)
+    system.destroy_timer(timer)
+    assert system.set(door_timeout=PATIENT["door_timeout"]).successful
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, result.DOOR_UNUSABLE)
+    assert "parameters are of model 'lid', expected 'drawer'" in result.reason
+    assert all(len(trajectory.points) == 1 for trajectory in system.sent)  # to hold
 
 
 def test_a_door_s_goal_presses_no_handle_that_is_not_there(system: DrawerClient) -> None:

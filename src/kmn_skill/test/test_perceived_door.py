@@ -227,3 +227,46 @@ def test_only_the_object_that_is_chosen_is_relied_on() -> None:
     assert not door.choose(2)
     assert not door.choose(0)
     np.testing.assert_allclose(door.values(0.9), other)
+
+
+FOREIGN: dict[str, Any] = {"model": "box_a", "number": 2}
+
+
+@pytest.mark.parametrize("beside", [FOREIGN, {**FOREIGN, "problem": "x is outside"}])
+def test_what_stands_beside_the_door_breaks_nothing(beside: dict[str, Any]) -> None:
+    """Several models in one morph_node: each frame tells of their objects by turns."""
+    perceived = door()
+    for time in (0.1, 0.2, 0.3):
+        perceived.add(seen(time, number=1))
+        perceived.add(seen(time, **beside))
+    np.testing.assert_allclose(perceived.values(0.3), VALUES)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_same_object_as_another_model_is_not_relied_on(number: int) -> None:
+    perceived = door(*(seen(time, number=number) for time in (0.1, 0.2, 0.3)))
+    with pytest.raises(DoorError, match="are of model 'box_a', expected 'door'"):
+        perceived.add(seen(0.4, model="box_a", number=number))
+    assert reason(perceived, 0.4) == "model"
+
+
+def test_what_stood_beside_a_door_that_is_gone_is_told() -> None:
+    perceived = door(*(seen(time, number=1) for time in (0.1, 0.2, 0.3)))
+    with pytest.raises(DoorError):
+        perceived.add(seen(1.5, **FOREIGN))
+    assert reason(perceived, 1.5) == "model"
+
+
+def test_the_chosen_object_is_not_relied_on_as_another_model() -> None:
+    perceived = door()
+    perceived.choose(2)
+    with pytest.raises(DoorError):
+        perceived.add(seen(0.1, **FOREIGN))
+    perceived.add(seen(0.1, number=1))
+    assert reason(perceived, 0.1) == "model"
+
+
+def test_why_an_object_of_another_model_is_refused_is_told_with_the_model() -> None:
+    with pytest.raises(DoorError, match="'box_a', expected 'door'; x is outside") as raised:
+        door(seen(0.1, **FOREIGN, problem="x is outside"))
+    assert raised.value.reason == "status"

@@ -86,6 +86,8 @@ class PerceivedDoor:
     def add(self, observation: DoorObservation) -> None:
         """Keep an observation; one that is not usable separates those before from those after.
 
+        But not where it is of another object than these, as of one beside it of another model.
+
         Raises
         ------
         DoorError
@@ -97,6 +99,8 @@ class PerceivedDoor:
             try:
                 self._check(observation)
             except DoorError as refused:
+                if self._is_beside(observation):
+                    return
                 self._kept.clear()
                 if refused.reason == HANDLE_NOT_SEEN:
                     self._unseen.append(observation)
@@ -209,16 +213,23 @@ class PerceivedDoor:
         except DoorError:
             return self.without_handle(now)
 
+    def _is_beside(self, observation: DoorObservation) -> bool:
+        """Tell whether an observation is of another object than the one that is seen at present."""
+        if not self._kept or 0 in (observation.number, self._kept[-1].number):
+            return False
+        is_another = observation.number != self._kept[-1].number
+        return is_another and observation.time - self._kept[-1].time <= self.settings.max_age
+
     def _check(self, observation: DoorObservation) -> None:
         """Raise if an observation is not usable at all."""
         model = self._model
         names = tuple(parameter.name for parameter in model.parameters)
-        if observation.model != model.name:
-            raise DoorError(
-                "model", f"parameters are of model '{observation.model}', expected '{model.name}'"
-            )
-        if observation.problem and not observation.lacks_handle:
-            raise DoorError("status", observation.problem)
+        problem, is_another = observation.problem, observation.model != model.name
+        another = f"parameters are of model '{observation.model}', expected '{model.name}'"
+        if problem and not observation.lacks_handle:
+            raise DoorError("status", f"{another}; {problem}" if is_another else problem)
+        if is_another:
+            raise DoorError("model", another)
         if observation.frame != self._frame:
             raise DoorError(
                 "frame", f"the door is given in '{observation.frame}', expected '{self._frame}'"
@@ -244,7 +255,7 @@ class PerceivedDoor:
                     f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]",
                 )
         if observation.lacks_handle:
-            raise DoorError(HANDLE_NOT_SEEN, observation.problem)
+            raise DoorError(HANDLE_NOT_SEEN, problem)
 
     def _check_certainty(
         self, values: NDArray[np.float64], covariance: NDArray[np.float64]

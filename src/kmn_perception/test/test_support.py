@@ -9,10 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.estimator import Status
-from kmn_perception.model.rendering import render
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.model.observation import Observation
+from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.sensor_noise import add_noise
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.pipeline_interface import ObjectEstimate
+from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import cuboid, shipped_pipeline
@@ -120,3 +123,18 @@ def test_a_flush_frame_is_noticed_by_the_place_of_the_handle(noise: str) -> None
     found = estimate("lever", values, noise, 0, proud=0.0).estimate
     assert found.status is not Status.OK
     assert "handle" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"), [("drawer", 4), ("cupboard_door", 8), ("fridge", 5), ("lid", 9)]
+)
+def test_a_thin_bar_that_is_not_there_is_not_invented(name: str, seed: int) -> None:
+    """All of its pixels are near its edges, where a sensor may look beside it."""
+    model, random = KinematicModel.load(name), np.random.default_rng(seed)
+    values, reasons = model.sample(random, 1)[0], []
+    complete = model.unit_cubes(*model.split(values))
+    for cubes in (complete[:-1], complete):
+        depth = add_noise(render(cubes, model.camera), "kinect", random)
+        observation = Observation(depth_to_cloud(depth, model.camera), model.camera)
+        reasons.append(refine(model, observation, values, RefinementSettings.load()).reason)
+    assert reasons == ["the bar is not seen where the fit has it: what is there lies behind it", ""]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -78,6 +79,8 @@ def unsupported(
         sides = solids[body, [RIGHT, BOTTOM]] - solids[body, [LEFT, TOP]]
         radius = int(0.5 * settings.averaged * sides.min())
         distinct = max(settings.distinct * rise, certain / (2 * radius + 1))
+        if _lies_deeper(residuals, body, settings.absent * rise, certain):
+            return f"the {name} is not seen where the fit has it: what is there lies behind it"
         missing, beside = _compare(residuals, body, distinct, radius, frayed)
         if missing > settings.max_missing * area:
             share = min(missing / area, 1.0)
@@ -170,6 +173,25 @@ def _compare(
             else:
                 unexplained += 1 if mean > 0.0 else -1
     return missing, unexplained
+
+
+@njit(cache=True, error_model="numpy")
+def _lies_deeper(residuals: Residuals, body: int, distance: float, certain: float) -> bool:
+    """Return whether the pixels of a body lie deeper by ``distance`` metres on average.
+
+    Parameters
+    ----------
+    certain
+        By which a single pixel must differ to be certain, metres.
+    """
+    total, count = 0.0, 0
+    rows, columns = residuals.bodies.shape
+    for i in range(rows):
+        for j in range(columns):
+            if residuals.bodies[i, j] == body:
+                total += _mean(residuals, i, j, 0)
+                count += 1
+    return count > 0 and -total / count > max(distance, certain / math.sqrt(count))
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,6 +18,9 @@ class SupportSettings(NamedTuple):
     distinct
         Averaged depths that differ by more show something else, as a fraction of how far the body
         stands out.
+    absent
+        A body is not there whose pixels lie deeper by this on average, as a fraction of how far it
+        stands out: of a thin one all pixels may be frayed.
     frayed
         A pixel may show what is this far beside it, in units of the lateral noise.
     max_missing
@@ -37,6 +40,7 @@ class SupportSettings(NamedTuple):
 
     averaged: Fraction
     distinct: Fraction
+    absent: Fraction
     frayed: NonNegative
     max_missing: Fraction
     max_unexplained: NonNegative

@@ -18,11 +18,36 @@ SQUARE_OUTLINE = 4.0  # length of a square's outline by the root of its area
 DOUBLINGS, BISECTIONS = 4, 7  # in the search for the ends of the possible values
 
 
+class Directions(NamedTuple):
+    """Directions (P, P), as columns in half ranges, their variances, and the unobservable ones."""
+
+    directions: NDArray[np.float64]
+    variances: NDArray[np.float64]
+    unobservable: NDArray[np.intp]
+
+
 class Marginal(NamedTuple):
     """The distribution of the distance along a direction, in multiples of it."""
 
     median: float
     variance: float
+
+
+def overlooked(problem: Problem, fit: Fit) -> list[NDArray[np.float64]]:
+    """Return values (P,) from which to fit again: what the search has missed, if it has.
+
+    Along an unobservable direction the fit has seen nothing. Where all that is possible there
+    nevertheless lies close together, and away from the fit, it shows from there: the fit has left
+    the image with an edge that is in it, say.
+    """
+    min_deviation = problem.settings.unobservable.deviation
+    directions, _, unobservable = _directions(problem, fit)
+    values, missed = fit.values, False
+    for direction in (directions[:, unobservable] * problem.half_range[:, None]).T:
+        marginal = _marginal(problem, fit, fit.values, direction)
+        if abs(marginal.median) > min_deviation > np.sqrt(marginal.variance):
+            values, missed = values + marginal.median * direction, True
+    return [values] if missed else []
 
 
 def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -33,11 +58,7 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
     the variance that of the posterior, given the likelihood of edges and depths.
     """
     settings, half_range = problem.settings.unobservable, problem.half_range
-    information = (fit.depth_information + fit.edge_information) * np.outer(half_range, half_range)
-    eigenvalues, directions = np.linalg.eigh(information)
-    variances = 1.0 / np.maximum(eigenvalues, MIN_INFORMATION)
-    unobservable = np.flatnonzero(variances > settings.deviation**2)
-    directions[:, unobservable] = _sparse(directions[:, unobservable])
+    directions, variances, unobservable = _directions(problem, fit)
     for i, j in combinations(unobservable, 2):
         directions[:, [i, j]] = _less_observable(problem, fit, directions[:, [i, j]])
     min_variance = problem.settings.limit_softness**2
@@ -50,6 +71,16 @@ def with_covariance(problem: Problem, fit: Fit) -> tuple[NDArray[np.float64], ND
             variances[i] = max(marginal.variance, min_variance)
     scaled = directions * half_range[:, None]
     return values, scaled * variances @ scaled.T
+
+
+def _directions(problem: Problem, fit: Fit) -> Directions:
+    half_range = problem.half_range
+    information = (fit.depth_information + fit.edge_information) * np.outer(half_range, half_range)
+    eigenvalues, directions = np.linalg.eigh(information)
+    variances = 1.0 / np.maximum(eigenvalues, MIN_INFORMATION)
+    unobservable = np.flatnonzero(variances > problem.settings.unobservable.deviation**2)
+    directions[:, unobservable] = _sparse(directions[:, unobservable])
+    return Directions(directions, variances, unobservable)
 
 
 def _sparse(basis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -81,7 +112,7 @@ def _less_observable(problem: Problem, fit: Fit, pair: NDArray[np.float64]) -> N
     only both together. The pair is scaled so that both move the surface equally far. Usually a look
     at the ends shows that neither sum nor difference is unobservable; integrating would be slow.
     """
-    half_range = problem.half_range[:, None]
+    settings, half_range = problem.settings.unobservable, problem.half_range[:, None]
     pixels = problem.pixels_per_unit(fit.values)[:, None]
     equal = pair / np.linalg.norm(pixels * half_range * pair, axis=0)
     rotated = np.column_stack([equal[:, 0] + equal[:, 1], equal[:, 0] - equal[:, 1]])
@@ -95,7 +126,7 @@ def _less_observable(problem: Problem, fit: Fit, pair: NDArray[np.float64]) -> N
         )
         for basis in (pair, rotated)
     ]
-    return rotated if variances[1] > variances[0] else pair
+    return rotated if variances[1] > settings.longer**2 * variances[0] else pair
 
 
 def _may_be_unobservable(problem: Problem, fit: Fit, direction: NDArray[np.float64]) -> bool:
@@ -134,7 +165,8 @@ def _loss_along(
 
     Pixels far from the edges that are explained wrongly count as well, if they are more than an
     error of the object's shape makes of its outline. The edges count up to their ends, so that the
-    pixels that count do not change with them.
+    pixels that count do not change with them; what the fit's own edges tell by neighbours whose
+    errors are the same counts once.
     """
     depth_information = float(direction @ fit.depth_information @ direction)
     count = len(problem.image.pixels)
@@ -146,7 +178,7 @@ def _loss_along(
         moved = values + distance * direction
         edges = fine_edges(problem, problem.view(moved), fit.noise, 0.0).loss
         wrong = max(problem.misfit(moved), allowed if slack > 0.0 else 0.0)
-        return edges + wrong * pixels + 0.5 * depth_information * distance**2
+        return fit.independent * edges + wrong * pixels + 0.5 * depth_information * distance**2
 
     return loss
 

@@ -40,6 +40,9 @@ class EdgeSettings(NamedTuple):
         ``subpixel_phases`` of a pixel from its first sample to its last.
     correlated_samples
         Number of neighbouring samples of an edge whose errors may be correlated.
+    bias
+        Standard deviation by which a sensor shifts a whole edge, in units of the lateral noise,
+        where it is asked how far a direction may be unobservable.
     """
 
     occluder: NonNegative
@@ -54,3 +57,4 @@ class EdgeSettings(NamedTuple):
     min_visible: Fraction
     subpixel_phases: NonNegative
     correlated_samples: Count
+    bias: NonNegative

@@ -48,6 +48,9 @@ class EdgeTerms(NamedTuple):
         The negative log-likelihood.
     noise_gradient, noise_information
         Its derivative by log s, and the information about log s.
+    independent
+        Fraction of the samples in view that are independent of each other, if each edge as a
+        whole may lie off by the settings' bias.
     """
 
     hessian: NDArray[np.float64]
@@ -56,6 +59,7 @@ class EdgeTerms(NamedTuple):
     loss: float
     noise_gradient: float
     noise_information: float
+    independent: float
 
 
 class EdgeSampling(NamedTuple):
@@ -88,6 +92,14 @@ class EdgeSampling(NamedTuple):
     shape_error: float
 
 
+class AddedEdge(NamedTuple):
+    """Whether an edge is in view, by how many samples, and which fraction is independent."""
+
+    visible: bool
+    samples: int
+    independent: float
+
+
 @njit(cache=True, error_model="numpy")
 def edge_terms(
     view: ModelView, image: InverseDepthImage, settings: EdgeSettings, sampling: EdgeSampling
@@ -96,19 +108,25 @@ def edge_terms(
     parameters = view.line_jacobians.shape[3]
     hessian, gradient = np.zeros((parameters, parameters)), np.zeros(parameters)
     information, unused = np.zeros((parameters, parameters)), np.zeros(parameters)
-    totals = np.zeros(3)
+    totals, samples, independent = np.zeros(3), 0.0, 0.0
     for body in range(view.lines.shape[0]):
         for edge in range(12):
             if view.faces[body, edge] >= 0:
                 if view.creases[body, edge] > sampling.max_crease:
                     continue
                 sums = EdgeSums(np.zeros((3, 3)), np.zeros(3), totals)
-                visible = _add_edge(view, image, settings, sampling, body, edge, sums)
+                added = _add_edge(view, image, settings, sampling, body, edge, sums)
                 jacobian = view.line_jacobians[body, edge]
                 add_normal_equations(hessian, gradient, jacobian, sums.moment, sums.force)
-                if visible:
+                if added.visible:
+                    samples += added.samples
+                    alone = added.samples * added.independent
+                    independent += alone / (1.0 + settings.bias**2 * alone)
                     add_normal_equations(information, unused, jacobian, sums.moment, sums.force)
-    return EdgeTerms(hessian, gradient, information, totals[0], totals[1], totals[2])
+    return EdgeTerms(
+        hessian, gradient, information, totals[0], totals[1], totals[2],
+        independent / samples if samples > 0.0 else 1.0,
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,8 +138,8 @@ def _add_edge(
     body: int,
     edge: int,
     sums: EdgeSums,
-) -> bool:
-    """Add the samples of an edge, one in each row (or column); return whether it is in view."""
+) -> AddedEdge:
+    """Add the samples of an edge, one in each row (or column)."""
     solids, lines, faces = view.solids, view.lines[body], view.faces[body]
     upwards, lowest = image.upwards, image.floor + settings.floor_margin
     noise, border = sampling.noise, sampling.border
@@ -139,7 +157,7 @@ def _add_edge(
     outwards = sampling.window / abs(line[1 - along])
     buffer = np.empty(2 * math.ceil(outwards) + 1)
     shifts = np.zeros(samples)
-    sampled, with_step = 0, 0
+    sampled, with_step, independent = 0, 0, 1.0
     for number in range(first, last + 1, 1 + samples // sampling.max_samples):
         crossing = crossing_of(solids, body, faces[edge], line, number)
         u, v = pixel(crossing, crossing.position)
@@ -177,11 +195,12 @@ def _add_edge(
     if noise.lateral > 0.0:
         phases = settings.subpixel_phases * (last - first) * abs(line[along] / line[1 - along])
         weight = 1.0 / (1.0 + moment[2, 2] / (ROUNDING_INFORMATION * (1.0 + phases**2)))
-        weight *= _independent(shifts, settings.correlated_samples)
+        independent = _independent(shifts, settings.correlated_samples)
+        weight *= independent
         weight /= 1.0 + sampling.shape_error**2 * weight * moment[2, 2]
         moment *= weight
         force *= weight
-    return with_step > settings.min_visible * sampled
+    return AddedEdge(with_step > settings.min_visible * sampled, sampled, independent)
 
 
 @njit(cache=True, error_model="numpy")

@@ -37,6 +37,8 @@ class Fit(NamedTuple):
         (P, P) what the depths and the edges tell about the values.
     steps
         Number of Gauss-Newton steps.
+    independent
+        Fraction of the edges' samples that are independent of each other.
     """
 
     values: NDArray[np.float64]
@@ -44,6 +46,7 @@ class Fit(NamedTuple):
     depth_information: NDArray[np.float64]
     edge_information: NDArray[np.float64]
     steps: int
+    independent: float
 
 
 def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
@@ -112,7 +115,7 @@ def _fit_finely(problem: Problem, values: NDArray[np.float64], steps: int) -> Fi
                 break
         if noise.depth == min_noise.depth:
             break  # exact depths: more of them tell nothing new
-    return Fit(values, before, planes.hessian, edges.information, steps)
+    return Fit(values, before, planes.hessian, edges.information, steps, edges.independent)
 
 
 def _fine_planes(problem: Problem, view: ModelView, noise: Noise, pixels: int) -> PlaneTerms:

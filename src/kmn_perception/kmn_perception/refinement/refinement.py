@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
-from kmn_perception.refinement.covariance import with_covariance
+from kmn_perception.refinement.covariance import overlooked, with_covariance
 from kmn_perception.refinement.curvature import curved_face
 from kmn_perception.refinement.gauss_newton import Fit, fit
 from kmn_perception.refinement.problem import Problem
@@ -118,6 +118,9 @@ def _refined(
     if misfit > settings.boxes_above:
         boxes = _around(model, points, problem.settings.starts)
         fits += [_fit_with_misfit(problem, values) for values in boxes]
+        best, misfit = min(fits, key=_misfit)
+    if settings.as_good < misfit <= settings.reject_above:
+        fits += [_fit_with_misfit(problem, values) for values in overlooked(problem, best)]
         best, misfit = min(fits, key=_misfit)
     iterations = sum(candidate.steps for candidate, _ in fits)
     rejected = misfit > settings.reject_above

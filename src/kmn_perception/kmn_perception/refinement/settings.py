@@ -221,6 +221,9 @@ class UnobservableSettings:
         Number of points at which the likelihood along it is integrated.
     passes
         Number of times that several unobservable directions are gone through.
+    longer
+        Two unobservable directions are replaced by their sum and difference where one of these is
+        this many times as long.
     unknown
         A parameter is not known from this fraction of the standard deviation of its limits on.
     """
@@ -229,6 +232,7 @@ class UnobservableSettings:
     loss_rise: NonNegative
     points: Count
     passes: Count
+    longer: Positive
     unknown: Fraction
 
 

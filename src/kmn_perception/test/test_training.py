@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from safetensors.torch import load_file
 
 from kmn_perception.configuration.section import ConfigurationError
@@ -130,3 +131,39 @@ def test_wrong_settings_are_refused(tmp_path: Path, line: str, message: str) -> 
     file.write_text("\n".join([*kept, line]))
     with pytest.raises(ConfigurationError, match=message):
         load_training_settings(file)
+
+
+def test_more_processes_make_the_same_data(tmp_path: Path) -> None:
+    """Compared are the weights, which no other data would give."""
+    one, three = tmp_path / "one.safetensors", tmp_path / "three.safetensors"
+    few = ["--samples", "60", "--epochs", "1"]
+    for settings in ("paper/box_a", "box_a"):
+        assert run(one, "--config", settings, "--restart", *few).returncode == 0
+        more = run(three, "--config", settings, "--restart", *few, "--processes", "3")
+        assert more.returncode == 0, more.stderr
+        for name, tensor in load_file(str(one)).items():
+            np.testing.assert_array_equal(tensor.numpy(), load_file(str(three))[name].numpy())
+
+
+def test_a_training_goes_on_from_a_weight_file(tmp_path: Path) -> None:
+    out = tmp_path / "w.safetensors"
+    few = ["--samples", "100", "--epochs", "1", "--rounds", "0"]
+    for network, shipped in (("cascade", "box_a"), ("paper", "paper/box_a")):
+        result = run(out, "--network", network, "--start", shipped, "--restart", *few)
+        assert result.returncode == 0, result.stderr
+        model = KinematicModel.load("box_a")
+        loaded, given = weights.load(out, model), weights.load(shipped, model)
+        assert loaded.metadata["start"]["training"] == given.metadata["training"]
+        error = loaded.metadata["errors"]["by_round_and_step"][-1]
+        assert error[1] < 0.2 * error[0]  # four batches from nothing stay above 0.5
+        assert any(
+            not torch.equal(tensor, given.network.state_dict()[name])
+            for name, tensor in loaded.network.state_dict().items()
+        )
+
+
+def test_a_network_of_another_design_is_not_trained_on(tmp_path: Path) -> None:
+    result = run(tmp_path / "w.safetensors", "--network", "cascade", "--start", "paper/box_a")
+    assert result.returncode == 1
+    assert "paper/box_a cannot be trained on with these settings: its network is" in result.stderr
+    assert "Traceback" not in result.stderr

@@ -27,13 +27,16 @@ from kmn_perception.evaluation.doors.room_statistics import statistics
 from kmn_perception.evaluation.doors.room_tables import room_report
 from kmn_perception.evaluation.hashes import short_hash
 from kmn_perception.evaluation.methods import MethodError
-from kmn_perception.evaluation.processes import measurements
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.table import report
 from kmn_perception.evaluation.tally import Tally
 from kmn_perception.model.room_model import has_surroundings
 from kmn_perception.model.sensor_noise import NOISES
+from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.weights import WeightsError
+from kmn_perception.training.processes import in_order
+
+WORTHWHILE = 50  # samples of a process; for fewer its start, some seconds, does not pay
 
 Measured = TypeVar("Measured", covariant=True)
 
@@ -138,7 +141,8 @@ def _measured(
         unit=" samples",
         mininterval=1.0,
     ) as bar:
-        for measured in measurements(comparison, make, samples, jobs):
+        use_one_thread()
+        for measured in in_order(make, range(samples), jobs, WORTHWHILE):
             yield measured
             bar.update()
 

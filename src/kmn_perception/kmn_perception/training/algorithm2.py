@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import copy
 import math
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import mse_loss
 
 from kmn_perception.network.encoding import ParameterEncoding
 from kmn_perception.network.morph import predictions
-from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.morph_network import Inputs, MorphNetwork
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.settings import (
-    Algorithm2Settings,
-)
+from kmn_perception.training.processes import in_order
+from kmn_perception.training.samples import TrainingSamples
+from kmn_perception.training.settings import Algorithm2Settings
 from kmn_perception.training.training import Training
 
 
@@ -51,17 +56,14 @@ class Algorithm2(Training):
         steps = self.state.round
         target = self.samples + steps * self.augmented
         first = target - (self.augmented if steps else self.samples)
-        network = self.cpu_network()
-        with self.bar("data", target - first, self.state.filled - first) as bar:
-            for index in range(self.state.filled, target):
-                observation, truth = self.draw(index - first)
-                values = network.start([observation])
-                for prediction in islice(predictions(network, [observation]), steps):
-                    values = prediction.values
-                images = network.render_anew(steps, [observation], values)
-                left = network.remainder(values, truth[None])
-                self.data.put(slice(index, index + 1), images, left)
-                self.state.filled = index + 1
+        make = partial(PredictedSample, self.cpu_network(), self.source, steps)
+        missing = range(self.state.filled - first, target - first)
+        made = in_order(make, missing, self.processes)
+        with self.bar("data", target - first, missing.start) as bar, closing(made):
+            for images, left in made:
+                row = self.state.filled
+                self.data.put(slice(row, row + 1), images, left)
+                self.state.filled = row + 1
                 bar.update()
                 self.save_now_and_then()
 
@@ -77,3 +79,28 @@ class Algorithm2(Training):
         """Keep the first network as the baseline."""
         if self.state.round == 0:
             self.baseline = copy.deepcopy(self.network)
+
+
+@dataclass(frozen=True)
+class PredictedSample:
+    """Makes a sample of D: an observation, morphed by the network's predictions.
+
+    Attributes
+    ----------
+    steps
+        N_pred; with 0 the sample is as it was rendered.
+    """
+
+    network: MorphNetwork
+    source: TrainingSamples
+    steps: int
+
+    def __call__(self, index: int) -> tuple[Inputs, NDArray[np.float64]]:
+        """Return the network's inputs (1, ...), and what is to be predicted (1, n + m)."""
+        network = self.network
+        observation, truth = self.source.draw(index)
+        values = network.start([observation])
+        for prediction in islice(predictions(network, [observation]), self.steps):
+            values = prediction.values
+        images = network.render_anew(self.steps, [observation], values)
+        return images, network.remainder(values, truth[None])

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import torch
@@ -14,6 +16,18 @@ from torch import Tensor
 
 from kmn_perception.network.morph_network import Inputs, InputType
 from kmn_perception.training.run import RunError
+
+_SHARE_OF_MEMORY = 0.8  # of a device, that a data set may take
+_ROWS = 4096  # that are copied together
+
+Batch: TypeAlias = tuple[list[Tensor], Tensor]
+
+
+class Batches(Protocol):
+    """What gives batches."""
+
+    def batch(self, rows: NDArray[np.int64], /) -> Batch:
+        """Return inputs (B, ...) and (theta, gamma) (B, n + m), float32."""
 
 
 class Dataset:
@@ -60,10 +74,55 @@ class Dataset:
             array[rows] = part
         self.values[rows] = values
 
-    def batch(self, rows: NDArray[np.int64] | slice) -> tuple[list[Tensor], Tensor]:
+    def batch(self, rows: NDArray[np.int64] | slice) -> Batch:
         """Return inputs (B, ...) and (theta, gamma) (B, n + m), float32."""
         inputs = [torch.from_numpy(array[rows].astype(np.float32)) for array in self.inputs]
         return inputs, torch.from_numpy(self.values[rows].astype(np.float32))
+
+    def moved_to(self, device: torch.device, filled: int) -> Batches:
+        """Return what gives batches on a device, held in its memory where there is room."""
+        if device.type == "cpu":
+            return self
+        free, _ = torch.cuda.mem_get_info(device)
+        arrays = (*self.inputs, self.values)
+        needed = sum(array[:filled].nbytes for array in arrays)
+        if needed > _SHARE_OF_MEMORY * free:
+            return _Sent(self, device)
+        return _Held([_copied(array[:filled], device) for array in arrays], device)
+
+
+@dataclass(frozen=True)
+class _Sent:
+    """Batches that are sent to a device one by one."""
+
+    data: Dataset
+    device: torch.device
+
+    def batch(self, rows: NDArray[np.int64]) -> Batch:
+        inputs, values = self.data.batch(rows)
+        return [part.to(self.device) for part in inputs], values.to(self.device)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Batches of a data set that a device holds."""
+
+    arrays: list[Tensor]
+    device: torch.device
+
+    def batch(self, rows: NDArray[np.int64]) -> Batch:
+        chosen = torch.from_numpy(rows).to(self.device, non_blocking=True)
+        *inputs, values = (array[chosen].float() for array in self.arrays)
+        return inputs, values
+
+
+def _copied(array: NDArray[Any], device: torch.device) -> Tensor:
+    """Copy an array to a device, a part at a time: it need not fit into this machine's memory."""
+    copy = torch.empty(array.shape, dtype=torch.from_numpy(array[:0]).dtype, device=device)
+    for first in range(0, len(array), _ROWS):
+        rows = slice(first, first + _ROWS)
+        copy[rows] = torch.from_numpy(np.array(array[rows])).to(device)
+    return copy
 
 
 def _open(path: Path, shape: tuple[int, ...], dtype: np.dtype) -> np.memmap:

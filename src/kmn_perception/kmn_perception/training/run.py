@@ -15,6 +15,7 @@ import torch
 
 from kmn_perception.configuration.output import replacing
 from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.network.weight_file import WeightsError
 
 
 class RunError(ValueError):
@@ -113,5 +114,5 @@ def run_to_end(program: str, train: Callable[[], None]) -> None:
         train()
     except KeyboardInterrupt:
         sys.exit("interrupted; the same command resumes from the last checkpoint")
-    except (ConfigurationError, OSError, RunError) as error:
+    except (ConfigurationError, OSError, RunError, WeightsError) as error:
         sys.exit(f"{program}: {error}")

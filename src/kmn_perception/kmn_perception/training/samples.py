@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -17,6 +17,29 @@ from kmn_perception.scene.free_space import EMPTY, UNKNOWN
 from kmn_perception.training.settings import SensorSettings, SharedSettings, ViewSettings
 
 EVALUATION = (1,)  # spawn key that sets the evaluation's samples apart from all that train
+
+
+@dataclass(frozen=True)
+class TrainingSamples:
+    """The samples that one of ``count`` workers trains on; together they have the whole sequence.
+
+    Attributes
+    ----------
+    sensor
+        As `sample` takes it.
+    rank
+        Of the worker, from 0.
+    """
+
+    model: KinematicModel
+    seed: int
+    sensor: SensorSettings | None
+    rank: int
+    count: int
+
+    def draw(self, index: int) -> tuple[Observation, NDArray[np.float64]]:
+        """Return this worker's sample ``index``: what is seen, and the true (theta, gamma)."""
+        return sample(self.model, self.seed, index * self.count + self.rank, self.sensor)
 
 
 def sample(

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -13,12 +16,12 @@ from torch.nn.functional import smooth_l1_loss
 
 from kmn_perception.network.cascade import Cascade
 from kmn_perception.network.morph import predictions
-from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.network.morph_network import Inputs, MorphNetwork
 from kmn_perception.network.stage import Stage
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.settings import (
-    StagewiseSettings,
-)
+from kmn_perception.training.processes import in_order
+from kmn_perception.training.samples import TrainingSamples
+from kmn_perception.training.settings import StagewiseSettings
 from kmn_perception.training.training import Training
 
 CHUNK = 64  # samples that are generated together
@@ -35,8 +38,9 @@ class StagewiseTraining(Training):
     network: Cascade
 
     def prepare(self) -> None:
-        """Load what all trainings in stages share."""
+        """Load what all trainings in stages share; stages that are there are trained on."""
         self.stagewise = StagewiseSettings.load()
+        self.given = len(self.network.stages)
 
     @property
     def networks(self) -> dict[str, MorphNetwork]:
@@ -62,56 +66,25 @@ class StagewiseTraining(Training):
         step = self.state.round
         target = self.samples * self.copies
         self._discard_other_rounds()
-        network = self.cpu_network()
-        with self.bar("data", target, self.state.filled) as bar:
-            while self.state.filled < target:
-                first = self.state.filled // self.copies
-                rows = self._add(network, first, min(CHUNK, self.samples - first))
-                self.state.filled += rows
-                bar.update(rows)
+        make = partial(
+            MorphedChunk, self.cpu_network(), self.source, step,
+            self.samples, self.copies, self.stagewise.spread,
+        )  # fmt: skip
+        missing = range(self.state.filled // self.copies, self.samples, CHUNK)
+        made = in_order(make, missing, self.processes)
+        with self.bar("data", target, self.state.filled) as bar, closing(made):
+            for chunk in made:
+                for inputs, left in chunk:
+                    rows = slice(self.state.filled, self.state.filled + len(left))
+                    self.data.put(rows, inputs, left)
+                    self.state.filled = rows.stop
+                bar.update(sum(len(left) for _, left in chunk))
                 self.save_now_and_then()
-        if self.state.step == 0:
+        if self.state.step == 0 and step >= self.given:
             (*images, _), values = self.data.batch(slice(self.stagewise.standardised * self.copies))
             stage = self.network.stage(step)
             codes = stage.encoding.encode(values)
             stage.standardise(images, codes, self.stagewise.min_deviation)
-
-    def _add(self, network: MorphNetwork, first: int, count: int) -> int:
-        """Add ``count`` samples with all their copies; return the number of rows."""
-        step = self.state.round
-        fresh = step * self.samples + first
-        pairs = [self.draw(fresh + i) for i in range(count)]
-        observations = [observation for observation, _ in pairs]
-        values = network.start(observations)
-        for prediction in islice(predictions(network, observations), step):
-            values = prediction.values
-        truth = np.stack([truth for _, truth in pairs])
-        if step:  # the first stage alone decides how a symmetric object is turned
-            truth = self.model.nearest_equivalent(truth, values)
-        row = first * self.copies
-        generator = np.random.default_rng((self.settings.seed, self.workers.rank, step, first))
-        for estimates in self._with_shuffled_errors(values, truth, generator):
-            inputs = network.render_anew(step, observations, estimates)
-            left = network.remainder(estimates, truth)
-            self.data.put(slice(row, row + count), inputs, left)
-            row += count
-        return count * self.copies
-
-    def _with_shuffled_errors(
-        self,
-        values: NDArray[np.float64],
-        truth: NDArray[np.float64],
-        generator: np.random.Generator,
-    ) -> list[NDArray[np.float64]]:
-        """Return the estimates, and copies with errors that other samples have, grown or shrunk."""
-        errors = values - truth
-        estimates = [values]
-        for _ in range(self.copies - 1):
-            factor = generator.uniform(0.0, self.stagewise.spread, size=(len(errors), 1))
-            shuffled = truth + factor * generator.permutation(errors)
-            # As the network's own estimates, within the bounds where bodies have a size.
-            estimates.append(self.network.concatenate(shuffled, np.zeros_like(shuffled)))
-        return estimates
 
     def fitted(self) -> Stage:
         """Return the stage of this round."""
@@ -141,3 +114,64 @@ class StagewiseTraining(Training):
         for folder in (self.run.folder / f"data{self.workers.rank}").iterdir():
             if folder.name != f"round{self.state.round}":
                 shutil.rmtree(folder)
+
+
+@dataclass(frozen=True)
+class MorphedChunk:
+    """Makes some samples of a round, morphed by the stages before, with all their copies.
+
+    Attributes
+    ----------
+    step
+        Number of the stages before: the round.
+    samples
+        Of each round.
+    copies
+        How often each of them is used: with its own errors, and with those of others.
+    spread
+        The errors of others are multiplied by a random factor of up to this.
+    """
+
+    network: MorphNetwork
+    source: TrainingSamples
+    step: int
+    samples: int
+    copies: int
+    spread: float
+
+    def __call__(self, first: int) -> list[tuple[Inputs, NDArray[np.float64]]]:
+        """Return inputs (B, ...) and what is left to predict (B, n + m), for each of the copies."""
+        network, step, model = self.network, self.step, self.source.model
+        count = min(CHUNK, self.samples - first)
+        pairs = [self.source.draw(step * self.samples + first + i) for i in range(count)]
+        observations = [observation for observation, _ in pairs]
+        values = network.start(observations)
+        for prediction in islice(predictions(network, observations), step):
+            values = prediction.values
+        truth = np.stack([truth for _, truth in pairs])
+        if step:  # the first stage alone decides how a symmetric object is turned
+            truth = model.nearest_equivalent(truth, values)
+        seed = (self.source.seed, self.source.rank, step, first)
+        return [
+            (
+                network.render_anew(step, observations, estimates),
+                network.remainder(estimates, truth),
+            )
+            for estimates in self._with_shuffled_errors(values, truth, np.random.default_rng(seed))
+        ]
+
+    def _with_shuffled_errors(
+        self,
+        values: NDArray[np.float64],
+        truth: NDArray[np.float64],
+        generator: np.random.Generator,
+    ) -> list[NDArray[np.float64]]:
+        """Return the estimates, and copies with errors that other samples have, grown or shrunk."""
+        errors = values - truth
+        estimates = [values]
+        for _ in range(self.copies - 1):
+            factor = generator.uniform(0.0, self.spread, size=(len(errors), 1))
+            shuffled = truth + factor * generator.permutation(errors)
+            # As the network's own estimates, within the bounds where bodies have a size.
+            estimates.append(self.network.concatenate(shuffled, np.zeros_like(shuffled)))
+        return estimates

@@ -16,6 +16,7 @@ from kmn_perception.configuration.section import Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
 from kmn_perception.network.designs import DESIGNS
+from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.procedures import load_training_settings, procedure_of
 from kmn_perception.training.run import Run, run_to_end
 from kmn_perception.training.settings import SharedSettings, TrainingSettings
@@ -35,6 +36,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--config", help="name or YAML file of the settings (default: the model's, or `default`)"
     )
+    parser.add_argument("--start", help="name or weight file whose network is trained on")
     parser.add_argument("--network", choices=DESIGNS, help="design in place of the settings'")
     parser.add_argument("--samples", type=whole_number(10), help="N_data in place of the settings'")
     parser.add_argument("--epochs", type=positive, help="epochs of the first round")
@@ -47,6 +49,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--restart", action="store_true", help="discard an earlier run")
     parser.add_argument("--device", default="auto", choices=("auto", "cpu", "cuda"))
     parser.add_argument("--threads", type=positive, default=1, help="threads of torch")
+    parser.add_argument("--processes", type=positive, default=1, help="that generate data")
     return parser.parse_args(argv)
 
 
@@ -72,20 +75,20 @@ def train(options: argparse.Namespace) -> None:
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
     torch.manual_seed(settings.seed)
-    design = Section(settings.design, "training settings: design")
-    network = DESIGNS[settings.network].untrained(model, design)
+    network, origin = _network(model, settings, options.start)
     with Workers(options.device) as workers:
         if options.restart and workers.rank == 0 and folder.exists():
             shutil.rmtree(folder)
         known = {
             **weights.describe(model),
             "training": dataclasses.asdict(settings),
+            **origin,
         }
         run = Run(folder, {**known, "processes": workers.count}, shared.checkpoint_seconds)
         for interruption in (signal.SIGINT, signal.SIGTERM):
             signal.signal(interruption, run.interrupt)
         training = procedure_of(settings.network)(
-            network, settings, shared.validation, run, workers
+            network, settings, shared.validation, run, workers, options.processes
         )
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
@@ -94,6 +97,30 @@ def train(options: argparse.Namespace) -> None:
         if workers.rank == 0:
             weights.save(options.out, _result(training, known))
             workers.say(f"wrote {options.out}")
+
+
+def _network(
+    model: KinematicModel, settings: TrainingSettings, start: str | None
+) -> tuple[MorphNetwork, dict[str, Any]]:
+    """Return the network that the training begins with, and what a weight file says of it."""
+    design = Section(settings.design, "training settings: design")
+    untrained = DESIGNS[settings.network].untrained(model, design)
+    if start is None:
+        return untrained, {}
+    given = weights.load(start, model)
+    if _design(given.network) != _design(untrained):
+        raise weights.WeightsError(
+            f"{start} cannot be trained on with these settings: its network is "
+            f"{_design(given.network)}, theirs {_design(untrained)}"
+        )
+    known = {key: given.metadata[key] for key in ("training", "errors")}
+    return given.network.requires_grad_(True), {"start": known}
+
+
+def _design(network: MorphNetwork) -> dict[str, Any]:
+    """Return what a network is, but for how far it is grown."""
+    described = {key: value for key, value in network.describe().items() if key != "stages"}
+    return {"network": network.name, **described}
 
 
 def _result(training: Training, known: dict[str, Any]) -> weights.Weights:

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from kmn_perception.model.observation import Observation
 from kmn_perception.network.errors import errors_by_step
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.training.dataset import Dataset
 from kmn_perception.training.run import Run
-from kmn_perception.training.samples import sample
+from kmn_perception.training.samples import TrainingSamples, sample
 from kmn_perception.training.settings import TrainingSettings, ValidationSettings
 from kmn_perception.training.workers import Workers
 
@@ -51,6 +50,8 @@ class Training(ABC):
         Keeps checkpoints and curves.
     workers
         The processes that train together; each generates and keeps its own share of the data.
+    processes
+        How many generate the data of each of them.
     """
 
     settings_type: ClassVar[type[TrainingSettings]] = TrainingSettings
@@ -64,11 +65,15 @@ class Training(ABC):
         validation: ValidationSettings,
         run: Run,
         workers: Workers,
+        processes: int = 1,
     ) -> None:
         self.network, self.model = network.to(workers.device), network.model
         self.settings, self.validation, self.run, self.workers = settings, validation, run, workers
-        self.state = TrainingState()
-        self.samples = math.ceil(settings.samples / workers.count)  # N_data of this process
+        self.processes, self.state = processes, TrainingState()
+        self.samples = math.ceil(settings.samples / workers.count)  # N_data of this worker
+        self.source = TrainingSamples(
+            self.model, settings.seed, settings.sensor, workers.rank, workers.count
+        )
         self.prepare()
 
     @abstractmethod
@@ -120,11 +125,6 @@ class Training(ABC):
     def end_round(self) -> None:
         """Keep what is left of a round."""
 
-    def draw(self, index: int) -> tuple[Observation, NDArray[np.float64]]:
-        """Return training sample ``index`` of this process: an observation and its truth."""
-        number = index * self.workers.count + self.workers.rank
-        return sample(self.model, self.settings.seed, number, self.settings.sensor)
-
     def _fit(self) -> None:
         settings, state = self.settings, self.state
         epochs = settings.retrain_epochs if state.round else settings.epochs
@@ -132,13 +132,13 @@ class Training(ABC):
         steps_per_epoch = math.ceil(state.filled / batch)
         total = epochs * steps_per_epoch
         parallel = self.workers.parallel(self.fitted()).train()
+        data = self.data.moved_to(self.workers.device, state.filled)
         started = time.monotonic() - state.seconds
         with self.bar("fit", total * batch, state.step * batch) as bar:
             for rows in self._batches(batch, steps_per_epoch, total):
                 self._set_learning_rate(state.step / total)
-                inputs, values = self.data.batch(rows)
-                outputs = parallel(*(part.to(self.workers.device) for part in inputs))
-                loss = self.loss(outputs, values.to(self.workers.device))
+                inputs, values = data.batch(rows)
+                loss = self.loss(parallel(*inputs), values)
                 self.optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 self.optimiser.step()

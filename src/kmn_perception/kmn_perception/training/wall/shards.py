@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import itertools
-import math
-import multiprocessing
-import signal
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
 from kmn_perception.configuration.output import replacing
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.network.threads import use_one_thread
+from kmn_perception.training.processes import in_order
 from kmn_perception.training.run import RunError
 from kmn_perception.training.wall.samples import Sample, is_validation, samples_of
 from kmn_perception.training.wall.settings import WallTrainingSettings
 from kmn_perception.training.wall.targets import Target
 
-_ROOMS_OF_A_PROCESS = 20  # for fewer its start, some seconds, does not pay
-
-_of_process: tuple[WallTrainingSettings, DoorSettings]  # of a started process
+_WORTHWHILE = 20  # rooms of a process; for fewer its start, some seconds, does not pay
 
 
 def make_shards(
@@ -50,10 +46,10 @@ def make_shards(
     files = {folder / f"rooms{shard[0]:07d}.npz": shard for shard in shards}
     missing = {file: shard for file, shard in files.items() if not file.exists()}
     wanted = list(itertools.chain.from_iterable(missing.values()))
-    useful = math.ceil(len(wanted) / _ROOMS_OF_A_PROCESS)
+    make = partial(_renderer, settings, doors)
+    rendered = in_order(make, wanted, processes, _WORTHWHILE)
     bar: tqdm[Any] = tqdm(total=rooms, initial=rooms - len(wanted), unit=" rooms", desc="rooms")
-    with bar, _Renderers(settings, doors, min(processes, useful)) as renderers:
-        rendered = renderers.samples(wanted)
+    with bar, closing(rendered):
         for file, shard in missing.items():
             samples: list[list[Sample]] = []
             for found in itertools.islice(rendered, len(shard)):
@@ -124,38 +120,6 @@ def _read(file: Path) -> Iterator[tuple[int, Sample]]:
         yield int(room), Sample(part, Target(*map(float, target)))
 
 
-class _Renderers:
-    """Processes that render rooms; one renders in this process."""
-
-    def __init__(self, settings: WallTrainingSettings, doors: DoorSettings, count: int) -> None:
-        self._arguments, self._count = (settings, doors), count
-        self._pool: Any = None
-
-    def __enter__(self) -> _Renderers:
-        if self._count > 1:
-            context = multiprocessing.get_context("spawn")
-            self._pool = context.Pool(self._count, _start, self._arguments)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._pool is not None:
-            self._pool.terminate()
-
-    def samples(self, rooms: Sequence[int]) -> Iterator[list[Sample]]:
-        """Yield the samples of each room, in this order."""
-        if self._pool is not None:
-            yield from self._pool.imap(_samples, rooms)
-        else:
-            yield from (samples_of(room, *self._arguments) for room in rooms)
-
-
-def _start(settings: WallTrainingSettings, doors: DoorSettings) -> None:
-    global _of_process
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends the others
-    cv2.setNumThreads(1)
-    use_one_thread()
-    _of_process = settings, doors
-
-
-def _samples(room: int) -> list[Sample]:
-    return samples_of(room, *_of_process)
+def _renderer(settings: WallTrainingSettings, doors: DoorSettings) -> Callable[[int], list[Sample]]:
+    """Return what renders a room, in a process that does nothing else."""
+    return partial(samples_of, settings=settings, doors=doors)

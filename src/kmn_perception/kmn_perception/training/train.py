@@ -113,8 +113,9 @@ def _network(
             f"{start} cannot be trained on with these settings: its network is "
             f"{_design(given.network)}, theirs {_design(untrained)}"
         )
-    known = {key: given.metadata[key] for key in ("training", "errors")}
-    return given.network.requires_grad_(True), {"start": known}
+    known = ("training", "errors", "start")
+    origin = {key: given.metadata[key] for key in known if key in given.metadata}
+    return given.network.requires_grad_(True), {"start": origin}
 
 
 def _design(network: MorphNetwork) -> dict[str, Any]:

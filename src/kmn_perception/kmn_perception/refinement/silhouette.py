@@ -165,7 +165,10 @@ def strip_around(
         if behind > expected and (beside > 0.0 or entered == 0.0):
             buffer[k] = 0.0  # another body is in front
             continue
-        buffer[k] = _evidence(settings, noise.depth, others, seen, expected, behind, beside, front)
+        farthest = min(expected, crossing.inverse_depth)
+        buffer[k] = _evidence(
+            settings, noise.depth, others, seen, expected, farthest, behind, beside, front
+        )
         if interpolated[row, column]:
             buffer[k] *= settings.interpolated
     return Strip(start, step, buffer[:count])
@@ -178,6 +181,7 @@ def _evidence(
     others: float,
     seen: float,
     expected: float,
+    farthest: float,
     behind: float,
     beside: float,
     front: float,
@@ -188,9 +192,10 @@ def _evidence(
     ----------
     others
         Probability that a pixel that does not show the body shows another one and not nothing.
-    seen, expected, behind, beside, front
-        Inverse depths: of the pixel, of the body there, of the model's other bodies there, of those
-        behind the edge, and of what the model shows inside the edge (0 if there is none).
+    seen, expected, farthest, behind, beside, front
+        Inverse depths: of the pixel, of the body there, of the farther one of that and the edge, of
+        the model's other bodies there, of those behind the edge, and of what the model shows inside
+        the edge (0 if there is none).
     """
     certain = 1.0 - settings.outliers
     if seen <= 0.0:
@@ -203,7 +208,7 @@ def _evidence(
         is_model = front > 0.0 and 1.0 / seen > 1.0 / front - settings.occluder
         return certain if is_model and behind == 0.0 and beside == 0.0 else 0.0
     if behind == 0.0:
-        if depth > settings.background and seen < expected - margin:
+        if 1.0 / seen - 1.0 / farthest > settings.background and seen < farthest - margin:
             return -certain
         if beside == 0.0:
             return certain

@@ -142,7 +142,7 @@ class DoorPipeline:
         values = np.concatenate([estimate.theta, estimate.gamma])
         names, cubes = self.room.cubes(
             values,
-            self.room.nuisances(**{OPENING: _value(estimate.joints, HINGE)}),
+            self.room.nuisances(**{OPENING: estimate.positions.get(HINGE, 0.0)}),
             estimate.alternative or "none",
             "left" if estimate.mirrored else "right",
         )
@@ -226,10 +226,6 @@ def _calibrated(finder: DoorFinder, settings: PipelineSettings) -> DoorFinder:
     shipped = DoorSettings.load()
     delivered = settings.calibration is CalibrationState.DELIVERED
     return finder.with_calibration(shipped.delivered if delivered else shipped.calibration)
-
-
-def _value(quantities: tuple[Quantity, ...], name: str) -> float:
-    return next((quantity.value for quantity in quantities if quantity.name == name), 0.0)
 
 
 def _panel_pixels(

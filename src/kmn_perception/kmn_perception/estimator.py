@@ -20,6 +20,7 @@ from kmn_perception.network.morph import predict
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.refinement.calibration import calibration_covariance
+from kmn_perception.refinement.geometry import shape_of
 
 
 class Status(IntEnum):
@@ -130,6 +131,11 @@ class Estimate:
     surroundings: tuple[Quantity, ...] = ()
     sensor_error: str = ""
 
+    @property
+    def positions(self) -> dict[str, float]:
+        """Positions of the joints that were estimated, by their names."""
+        return {joint.name: joint.value for joint in self.joints}
+
     @classmethod
     def none(cls, model: KinematicModel, points: int, status: Status, reason: str) -> Estimate:
         """Return the estimate that says why there is none."""
@@ -237,26 +243,30 @@ class MorphEstimator:
         self, observation: Observation, values: NDArray[np.float64], change: float, iterations: int
     ) -> Estimate:
         """Refine what was predicted, and judge it."""
-        model, points = self.model, observation.points
-        covariance: NDArray[np.float64] = np.full((len(values),) * 2, np.nan)
+        model, points, count = self.model, observation.points, len(values)
+        covariance: NDArray[np.float64] = np.full((count, count), np.nan)
         if self.settings.refine:
             fit = refine(model, observation, values, self.refinement, self.settings.shape_error)
             values, doubt = fit.values, fit.reason
-            calibration = self.settings.calibration_error
+            shape, calibration = shape_of(model, model.states), self.settings.calibration_error
             covariance = fit.covariance + calibration_covariance(
-                model, values, observation.camera, calibration
+                shape, values, observation.camera, calibration
             )
         else:
             doubt = self._doubt(change)
-        theta, gamma = model.split(values)
-        distances = surface_distances(model.unit_cubes(theta, gamma), points)
+        deviations = np.sqrt(np.diag(covariance))[count:].tolist()
+        states = zip(model.states, values[count:].tolist(), deviations, strict=False)
+        joints = tuple(Quantity(joint.name, *state) for joint, *state in states)
+        theta, gamma = model.split(values[:count])
+        positions = {joint.name: joint.value for joint in joints}
+        distances = surface_distances(model.moved_cubes(values[:count], positions), points)
         residual, deviation = np.quantile(distances, (0.5, self.settings.deviation_share)).tolist()
         status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(
             model=model,
             theta=theta,
             gamma=gamma,
-            covariance=covariance,
+            covariance=covariance[:count, :count],
             transform=model.transformation.matrix(theta),
             iterations=iterations,
             converged=not doubt,
@@ -264,6 +274,7 @@ class MorphEstimator:
             points_used=len(points),
             status=status,
             reason=reason,
+            joints=joints,
         )
 
     def _doubt(self, change: float) -> str:
@@ -280,9 +291,9 @@ class MorphEstimator:
     ) -> tuple[Status, str]:
         """Return the status of an estimate, and the reason if it is not OK."""
         settings = self.settings
-        margin = settings.limit_margin * np.ptp(self.model.limits, axis=1)
-        for parameter, value, slack in zip(self.model.parameters, values, margin, strict=True):
+        for parameter, value in zip(self.model.estimated, values, strict=False):
             low, high = parameter.limits
+            slack = settings.limit_margin * (high - low)
             if not low - slack <= value <= high + slack:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 reason = f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]{unit}"

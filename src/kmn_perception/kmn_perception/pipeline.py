@@ -234,7 +234,8 @@ class MorphPipeline:
         """Return the bodies (B, 4, 4) of an estimate, none where there are no parameters."""
         if not np.isfinite([*estimate.theta, *estimate.gamma]).all():
             return np.empty((0, 4, 4))
-        return estimate.model.unit_cubes(estimate.theta, estimate.gamma)
+        values = np.concatenate([estimate.theta, estimate.gamma])
+        return estimate.model.moved_cubes(values, estimate.positions)
 
     def _likely_bodies(self, found: ObjectEstimate) -> NDArray[np.float64]:
         """Return the bodies (B, 4, 4) of an estimate that lies on the points, OK or not."""

@@ -19,6 +19,7 @@ from kmn_perception.refinement.view import ModelView, model_view
 
 Vector = NDArray[np.float64]
 CONTACT = 0.005  # metres, within which a body touches another one
+RELIEF = 0.15  # metres, up to which an edge that touches another body has a step
 
 # Another structure than any of the shipped models: three bodies, height and scales in another
 # order, sizes and places that depend on several parameters.
@@ -94,10 +95,12 @@ def test_unit_cubes_move_as_finite_differences_say(
 @given(shares)
 def test_planes_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
     values, shape, matrix = within(model, share), shape_of(model), model.camera.projection
-    view = model_view(shape, values, matrix, CONTACT)
+    view = model_view(shape, values, matrix, CONTACT, RELIEF)
     steepness = np.linalg.norm(planes(view)[..., :2], axis=-1)
     not_edge_on = steepness < 0.1  # a face that is seen exactly edge-on has no derivative
-    expected = derivative(lambda v: planes(model_view(shape, v, matrix, CONTACT)), values, 1e-7)
+    expected = derivative(
+        lambda v: planes(model_view(shape, v, matrix, CONTACT, RELIEF)), values, 1e-7
+    )
     difference = (view.plane_jacobians - expected) / (1.0 + np.abs(expected))
     assert np.abs(difference[not_edge_on]).max() < 1e-4
 
@@ -106,12 +109,12 @@ def test_planes_move_as_finite_differences_say(model: KinematicModel, share: lis
 @given(shares)
 def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list[float]) -> None:
     values, shape, matrix = within(model, share), shape_of(model), model.camera.projection
-    view = model_view(shape, values, matrix, CONTACT)
+    view = model_view(shape, values, matrix, CONTACT, RELIEF)
     shown = view.faces >= 0
 
     def distances(v: Vector) -> Vector:
         """Return the distances of the edges' ends, as they are at ``values``, to the edges at v."""
-        lines = model_view(shape, v, matrix, CONTACT).lines
+        lines = model_view(shape, v, matrix, CONTACT, RELIEF).lines
         ends = np.stack([view.ends[..., :2], view.ends[..., 2:]], axis=2)
         ends = np.concatenate([ends, np.ones_like(ends[..., :1])], axis=-1)
         return np.einsum("beki,bei->bek", ends, lines)
@@ -129,7 +132,7 @@ def test_lines_move_as_finite_differences_say(model: KinematicModel, share: list
 def test_raycasts_agree_with_the_renderer(model: KinematicModel, share: list[float]) -> None:
     values, camera = within(model, share), model.camera.resized(64, 48)
     depth = render(model.unit_cubes(*model.split(values)), camera)
-    view = model_view(shape_of(model), values, camera.projection, CONTACT)
+    view = model_view(shape_of(model), values, camera.projection, CONTACT, RELIEF)
     cast = np.array([[raycast_any(view.solids, u, v)[0] for u in range(64)] for v in range(48)])
     np.testing.assert_array_equal(cast > 0.0, np.isfinite(depth))
     np.testing.assert_allclose(1.0 / cast[cast > 0.0], depth[cast > 0.0], rtol=1e-5)
@@ -138,7 +141,7 @@ def test_raycasts_agree_with_the_renderer(model: KinematicModel, share: list[flo
 def test_a_box_seen_from_above_has_the_silhouette_of_its_contour() -> None:
     """The camera of the boxes sees the front and the top of a box that stands before it."""
     box = KinematicModel.load("box_b")
-    view = model_view(shape_of(box), np.zeros(3), box.camera.projection, CONTACT)
+    view = model_view(shape_of(box), np.zeros(3), box.camera.projection, CONTACT, RELIEF)
     assert (view.faces[0] >= 0).sum() == 6
     corners = (
         box.unit_cubes([0, 0, 0], [])[0]

@@ -25,7 +25,12 @@ from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.network.errors import values_by_step
 from kmn_perception.network.morph_network import MorphNetwork
 from kmn_perception.network.weights import Weights, WeightsError
-from kmn_perception.refinement import RefinementSettings, refine, refine_from_scratch
+from kmn_perception.refinement import (
+    Refinement,
+    RefinementSettings,
+    refine,
+    refine_from_scratch,
+)
 
 
 class MethodError(ValueError):
@@ -85,7 +90,7 @@ def kmn_refined(model: KinematicModel, networks: Networks, settings: EvaluationS
         *_, last = islice(predicted.estimates(observation), predicted.counted + 1)
         yield last
         refined = refine(model, observation, last.values, fit)
-        yield MethodEstimate(refined.values, refined.covariance)
+        yield _without_states(model, refined)
 
     return Method(estimates, counted=1)
 
@@ -96,7 +101,7 @@ def multistart(model: KinematicModel, networks: Networks, settings: EvaluationSe
 
     def estimates(observation: Observation) -> Iterator[MethodEstimate]:
         refined = refine_from_scratch(model, observation, fit)
-        yield MethodEstimate(refined.values, refined.covariance)
+        yield _without_states(model, refined)
 
     return Method(estimates, counted=0)
 
@@ -160,6 +165,11 @@ def choose(
         except MethodError as error:
             left_out[name] = str(error)
     return chosen, left_out
+
+
+def _without_states(model: KinematicModel, fit: Refinement) -> MethodEstimate:
+    count = len(model.parameters)
+    return MethodEstimate(fit.values[:count], fit.covariance[:count, :count])
 
 
 def _loaded(weights: Weights | WeightsError) -> Weights:

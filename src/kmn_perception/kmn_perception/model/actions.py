@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kmn_perception.configuration.section import Section
-from kmn_perception.model.parts import Body, Joint
+from kmn_perception.model.parts import Body, Joint, movers
 from kmn_perception.model.transformation import AXES
 
 
@@ -111,7 +111,7 @@ def read_actions(
             grasp,
             _motions(action.text("motions", default=section.text("name")), folder),
         )
-        moved = _movers(grasp.body.name, joints)
+        moved = movers(grasp.body.name, joints)
         if missing := [each.name for each in read.joints if each.name not in moved]:
             raise action.error(
                 f"grasp: '{grasp.body.name}' is not moved by the joint '{missing[0]}'"
@@ -131,13 +131,3 @@ def _read_grasp(section: Section, bodies: Sequence[Body]) -> Grasp:
     offset = section.numbers("offset", 3) if "offset" in section else [0.0] * 3
     body = by_name[section.text("body", by_name)]
     return Grasp(body, tuple(offset), section.text("axis", AXES))
-
-
-def _movers(body: str, joints: Sequence[Joint]) -> set[str]:
-    """Return the names of the joints that move a body."""
-    found = set()
-    for joint in reversed(joints):  # each stands after the one that moves its parent
-        if joint.body == body:
-            found.add(joint.name)
-            body = joint.parent
-    return found

@@ -15,7 +15,15 @@ from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_perception.model import model_file
 from kmn_perception.model.actions import Action, read_actions
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.parts import WORLD, Body, Joint, NetworkInput, Parameter, Stem
+from kmn_perception.model.parts import (
+    WORLD,
+    Body,
+    Joint,
+    NetworkInput,
+    Parameter,
+    Stem,
+    movers,
+)
 from kmn_perception.model.transformation import Transformation
 
 OPTIONAL = (
@@ -123,6 +131,23 @@ class KinematicModel:
     def parameters(self) -> tuple[Parameter, ...]:
         """All morphing parameters: theta, then gamma."""
         return (*self.theta, *self.gamma)
+
+    @cached_property
+    def states(self) -> tuple[Joint, ...]:
+        """The joints whose positions are estimated: those that actions move.
+
+        There are none where they move all bodies: where these are is for theta to tell.
+        """
+        moved = {action.joint.name for action in self.actions}
+        for body in self.bodies:
+            if not moved & movers(body.name, self.joints):
+                return tuple(joint for joint in self.joints if joint.name in moved)
+        return ()
+
+    @property
+    def estimated(self) -> tuple[Parameter | Joint, ...]:
+        """All that is estimated: theta, gamma, then the joints of which the positions are."""
+        return (*self.parameters, *self.states)
 
     @cached_property
     def limits(self) -> NDArray[np.float64]:

@@ -84,7 +84,7 @@ UNLATCH: Keys = {
     "target": Key(NUMBER, "rad or m", REQUIRED, "Its position at which the other joint is free."),
 }
 ACTION: Keys = {
-    "joint": Key(TEXT, "text", REQUIRED, "That is moved."),
+    "joint": Key(TEXT, "text", REQUIRED, "That is moved; its position is estimated."),
     "target": Key(NUMBER, "rad or m", REQUIRED, "To where, unless another position is asked for."),
     "grasp": Key({}, "see below", REQUIRED, "Where a hand takes hold."),
     "unlatch": Key({}, "see below", "nothing", "What is moved first, to let go a latch."),

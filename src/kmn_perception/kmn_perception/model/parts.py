@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +102,22 @@ class Joint:
         motion[:3, :3] = matrix_from_quaternion([*np.sin(half) * axis, np.cos(half)])
         motion[:3, 3] = origin - motion[:3, :3] @ origin
         return motion
+
+
+def movers(body: str, joints: Sequence[Joint]) -> set[str]:
+    """Return the names of the joints that move a body.
+
+    Parameters
+    ----------
+    joints
+        Each after the one that moves its parent.
+    """
+    found = set()
+    for joint in reversed(joints):
+        if joint.body == body:
+            found.add(joint.name)
+            body = joint.parent
+    return found
 
 
 @dataclass(frozen=True)

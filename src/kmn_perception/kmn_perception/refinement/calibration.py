@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
-from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.refinement.geometry import cuboids, shape_of
+from kmn_perception.refinement.geometry import Shape, cuboids
 
 CORNERS = np.array([[(i >> axis) % 2 - 0.5 for axis in range(3)] for i in range(8)])
 
 
 def calibration_covariance(
-    model: KinematicModel, values: NDArray[np.float64], camera: Camera, error: float
+    shape: Shape, values: NDArray[np.float64], camera: Camera, error: float
 ) -> NDArray[np.float64]:
     """Return the covariance (P, P) by what a camera measures too large or too small.
 
@@ -28,7 +27,7 @@ def calibration_covariance(
     error
         Standard deviation of each share.
     """
-    cubes, jacobians = cuboids(shape_of(model), values)
+    cubes, jacobians = cuboids(shape, values)
     maps = np.column_stack([CORNERS, np.ones(len(CORNERS))])
     corners: NDArray[np.float64] = np.einsum("bij,kj->bki", cubes, maps).reshape(-1, 3)
     slopes = np.einsum("bijp,kj->bkip", jacobians, maps).reshape(-1, len(values))

@@ -51,15 +51,20 @@ class Fit(NamedTuple):
 
 def fit(problem: Problem, values: NDArray[np.float64]) -> Fit:
     """Fit from a start: a coarse search that narrows, then down to the noise of the sensor."""
-    settings = problem.settings
-    for level in settings.search:
-        values = _search(problem, values, level)
+    settings, values = problem.settings, search(problem, values)
     steps = sum(level.steps for level in settings.search)
     reacquired = reacquire(problem, values)
     if reacquired is not values:
         values = _search(problem, reacquired, settings.search[-1])
         steps += settings.search[-1].steps
     return _fit_finely(problem, values, steps)
+
+
+def search(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Search from a start (P,), wide at first and then closer and closer."""
+    for level in problem.settings.search:
+        values = _search(problem, values, level)
+    return values
 
 
 def _search(

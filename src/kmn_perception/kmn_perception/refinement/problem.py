@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,9 @@ MIN_MOVEMENT = 1e-12  # pixels per unit
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A model, its P parameters' limits (P, 2), and an observation of it.
+    """A model, the limits (P, 2) of what is fitted of it, and an observation of it.
+
+    The P parameters are (theta, gamma) and then the positions of the joints that are free.
 
     Attributes
     ----------
@@ -51,6 +53,12 @@ class Problem:
         image = inverse_depth_image(observation, settings.occlusion)
         return cls(shape_of(model), model.limits, image, settings, shape_error)
 
+    def freed(self, model: KinematicModel) -> Problem:
+        """Return the problem with the joints free whose positions are estimated."""
+        free = model.states
+        limits = np.array([*model.limits, *(joint.limits for joint in free)])
+        return replace(self, shape=shape_of(model, free), limits=limits)
+
     @cached_property
     def half_range(self) -> NDArray[np.float64]:
         """(P,) half the distance between the limits."""
@@ -68,11 +76,15 @@ class Problem:
         return single_pixel_noise(self.image.inverse_depth)
 
     @cached_property
+    def depth_noise_in_metres(self) -> float:
+        """The same of the depth, at the object's distance."""
+        return self.depth_noise / self.inverse_depth_per_metre
+
+    @cached_property
     def visible_step(self) -> float:
         """Smallest step in depth that single pixels show, metres."""
         settings = self.settings.edges
-        noise = self.depth_noise / self.inverse_depth_per_metre
-        return max(settings.contrast, settings.single * noise)
+        return max(settings.contrast, settings.single * self.depth_noise_in_metres)
 
     @cached_property
     def shape_error_in_pixels(self) -> float:
@@ -86,7 +98,8 @@ class Problem:
 
     def view(self, values: NDArray[np.float64]) -> ModelView:
         """Return the model at ``values`` (P,) as the sensor sees it."""
-        return model_view(self.shape, values, self.image.projection, self.settings.edges.contrast)
+        edges, projection = self.settings.edges, self.image.projection
+        return model_view(self.shape, values, projection, edges.contrast, edges.background)
 
     def misfit(self, values: NDArray[np.float64]) -> float:
         """Return the fraction of pixels that the model explains wrongly, from some of them."""
@@ -97,6 +110,11 @@ class Problem:
         """Return the fraction of pixels that the model explains wrongly, from many of them."""
         settings = self.settings.misfit
         return misfit(self.view(values), self.image, settings, settings.final_pixels)
+
+    def explains(self, misfit: float) -> bool:
+        """Tell whether a misfit is hardly more than what the noise of single pixels makes."""
+        noise = (self.depth_noise_in_metres / self.settings.misfit.depth) ** 2
+        return misfit <= noise + self.settings.states.unexplained
 
     def clipped(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values (P,), clipped to the limits and a margin beside them."""

@@ -12,9 +12,17 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.covariance import overlooked, with_covariance
 from kmn_perception.refinement.curvature import curved_face
-from kmn_perception.refinement.gauss_newton import Fit, fit
+from kmn_perception.refinement.gauss_newton import Fit, fit, search
 from kmn_perception.refinement.problem import Problem
-from kmn_perception.refinement.settings import RefinementSettings, StartSettings
+from kmn_perception.refinement.settings import RefinementSettings
+from kmn_perception.refinement.starts import (
+    above_centroid,
+    around,
+    scanned,
+    with_joints_moved,
+    yawed,
+)
+from kmn_perception.refinement.states import JointEvidence
 from kmn_perception.refinement.support import unsupported
 
 
@@ -24,7 +32,7 @@ class Refinement(NamedTuple):
     Attributes
     ----------
     values, covariance
-        (n + m,) and (n + m, n + m) of (theta, gamma).
+        (P,) and (P, P) of (theta, gamma) and the positions of the model's ``states``.
     misfit
         Fraction of the observed pixels that the model explains wrongly.
     iterations
@@ -54,7 +62,8 @@ def refine(
 ) -> Refinement:
     """Fit (theta, gamma) to an observation, starting from ``values`` (n + m,).
 
-    The result is never worse than the start by the common misfit.
+    The result is never worse than the start by the common misfit. Joints whose positions are
+    estimated are at 0 unless the observation says otherwise.
 
     Parameters
     ----------
@@ -63,12 +72,10 @@ def refine(
     """
     problem = Problem.of(model, observation, settings, shape_error)
     values = np.asarray(values, dtype=np.float64)
-    count = len(problem.image.pixels)
-    if count < settings.min_points:
-        reason = f"{count} points in the image, at least {settings.min_points} are needed"
-        return _unrefined(model, values, np.nan, 0, reason)
+    if few := _too_few(problem):
+        return _unrefined(problem.freed(model), values, np.nan, 0, few)
     if not np.isfinite(values).all():
-        return _unrefined(model, values, np.nan, 0, "the start is not finite")
+        return _unrefined(problem.freed(model), values, np.nan, 0, "the start is not finite")
     return _refined(model, problem, observation.points, values, [values])
 
 
@@ -90,15 +97,19 @@ def refine_from_scratch(
 ) -> Refinement:
     """Fit (theta, gamma) to an observation without an estimate, from several starts."""
     problem = Problem.of(model, observation, settings)
-    start = _above_centroid(model, observation)
-    count = len(problem.image.pixels)
-    if count < settings.min_points:
-        reason = f"{count} points in the image, at least {settings.min_points} are needed"
-        return _unrefined(model, start, np.nan, 0, reason)
-    starts = _yawed(model, start, settings.starts.yaws)
+    start = above_centroid(model, observation)
+    if few := _too_few(problem):
+        return _unrefined(problem.freed(model), start, np.nan, 0, few)
+    starts = yawed(model, start, settings.starts.yaws)
     starts.sort(key=problem.misfit)
     best = starts[: settings.starts.fitted]
     return _refined(model, problem, observation.points, starts[0], best)
+
+
+def _too_few(problem: Problem) -> str:
+    """Return how many points there are if those are too few; else empty."""
+    count, least = len(problem.image.pixels), problem.settings.min_points
+    return f"{count} points in the image, at least {least} are needed" if count < least else ""
 
 
 def _refined(
@@ -108,15 +119,42 @@ def _refined(
     start: NDArray[np.float64],
     starts: list[NDArray[np.float64]],
 ) -> Refinement:
-    """Fit from all starts, and from what a scan finds where they fail; return the best."""
+    """Fit with the joints at 0, and with free ones to tell whether they are."""
+    at_rest = _best(model, problem, points, start, [fit(problem, values) for values in starts])
+    if not model.states:
+        return at_rest
+    settings, freed = problem.settings, problem.freed(model)
+    closed = np.concatenate([at_rest.values, np.zeros(len(model.states))])
+    loose = fit(freed, closed)
+    evidence = JointEvidence.of(freed, loose, len(model.states))
+    plausible = not at_rest.reason and problem.explains(at_rest.misfit)
+    if plausible and evidence.excess <= settings.states.sure:
+        return at_rest._replace(values=closed, covariance=evidence.at_rest(at_rest.covariance))
+    free = _best(model, freed, points, closed, [loose])
+    if not free.reason and problem.explains(free.misfit):
+        return free
+    moved = [at for values in (at_rest.values, start) for at in with_joints_moved(freed, values)]
+    found = sorted((search(freed, values) for values in moved), key=freed.misfit)
+    fits = [loose, *(fit(freed, values) for values in found[: settings.starts.fitted])]
+    return _best(model, freed, points, closed, fits)
+
+
+def _best(
+    model: KinematicModel,
+    problem: Problem,
+    points: NDArray[np.float32],
+    start: NDArray[np.float64],
+    from_starts: list[Fit],
+) -> Refinement:
+    """Return the best of all fits, and of those from what a scan finds where they fail."""
     settings = problem.settings.misfit
-    fits = [_fit_with_misfit(problem, values) for values in starts]
+    fits = [(candidate, problem.misfit(candidate.values)) for candidate in from_starts]
     best, misfit = min(fits, key=_misfit)
     if misfit > settings.retry_above:
-        fits += [_fit_with_misfit(problem, _scan(problem, v)) for v in (best.values, start)]
+        fits += [_fit_with_misfit(problem, scanned(problem, v)) for v in (best.values, start)]
         best, misfit = min(fits, key=_misfit)
     if misfit > settings.boxes_above:
-        boxes = _around(model, points, problem.settings.starts)
+        boxes = around(model, points, problem.settings.starts)
         fits += [_fit_with_misfit(problem, values) for values in boxes]
         best, misfit = min(fits, key=_misfit)
     if settings.as_good < misfit <= settings.reject_above:
@@ -125,7 +163,7 @@ def _refined(
     iterations = sum(candidate.steps for candidate, _ in fits)
     rejected = misfit > settings.reject_above
     if rejected:
-        values, covariance = best.values, _uniform_covariance(model)
+        values, covariance = best.values, _uniform_covariance(problem)
     else:
         values, covariance = with_covariance(problem, best)
         covariance = covariance + _rivalry(model, best.values, fits, misfit + settings.as_good)
@@ -139,11 +177,11 @@ def _refined(
         spread = covariance + np.diag(problem.pixels_per_unit(values) ** -2.0)
         if error @ np.linalg.solve(spread, error) > problem.settings.agreement**2 * len(error):
             less = f"the fit explains less ({misfit:.3f} wrong) than its start ({before:.3f})"
-            return _unrefined(model, start, before, iterations, doubt or less)
+            return _unrefined(problem, start, before, iterations, doubt or less)
         values, covariance, misfit = start, covariance + np.outer(error, error), before
     if rejected or misfit > settings.reject_above:
         doubt = f"the model explains {max(misfit, settings.reject_above):.0%} or more wrongly"
-    doubt = doubt or _unknown(model, covariance, problem.settings.unobservable.unknown)
+    doubt = doubt or _unknown(model, problem, covariance)
     return Refinement(values, covariance, misfit, iterations, improved, doubt)
 
 
@@ -154,34 +192,6 @@ def _fit_with_misfit(problem: Problem, values: NDArray[np.float64]) -> tuple[Fit
 
 def _misfit(candidate: tuple[Fit, float]) -> float:
     return candidate[1]
-
-
-def _around(
-    model: KinematicModel, points: NDArray[np.float32], settings: StartSettings
-) -> list[NDArray[np.float64]]:
-    """Return cuboids of several yaws around the points (N, 3); none of a model that is no cuboid.
-
-    Of a carton that is half hidden, or shows one face only, a wrong yaw may be a minimum.
-    """
-    kinds = model.transformation.kinds
-    if model.symmetry != "quarter_turn" or len(model.bodies) > 1:
-        return []
-    names = [("translation", "x"), ("translation", "y"), ("rotation", "z")]
-    places = [kinds.index(kind) for kind in names]
-    size, starts = np.diag(model.prototype_cubes[0]), []
-    low, high = model.limits[places[2]]
-    for k in range(settings.around):
-        yaw = low + (k + 0.5) / settings.around * (high - low)
-        axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-        ends = np.quantile(points[:, :2] @ axes.T, [settings.rest, 1.0 - settings.rest], axis=0)
-        extent = [*(ends[1] - ends[0]), np.quantile(points[:, 2], 1.0 - settings.rest)]
-        values = model.prototype.copy()
-        values[places] = [*(ends.mean(axis=0) @ axes), yaw]
-        for axis, name in enumerate("xyz"):
-            if ("scale", name) in kinds:
-                values[kinds.index(("scale", name))] = extent[axis] / size[axis] - 1.0
-        starts.append(np.clip(values, *model.limits.T))
-    return starts
 
 
 def _rivalry(
@@ -199,57 +209,23 @@ def _rivalry(
     return np.asarray(np.transpose(rivals) @ np.array(rivals) / len(rivals))
 
 
-def _unknown(model: KinematicModel, covariance: NDArray[np.float64], unknown: float) -> str:
+def _unknown(model: KinematicModel, problem: Problem, covariance: NDArray[np.float64]) -> str:
     """Return which parameters of the transformation are not known at all; empty if none."""
-    known = np.sqrt(np.diag(_uniform_covariance(model)))
-    shares = np.sqrt(np.diag(covariance)) / known
+    known, unknown = _uniform_covariance(problem), problem.settings.unobservable.unknown
+    shares = np.sqrt(np.diag(covariance) / np.diag(known))
     names = [p.name for p, share in zip(model.theta, shares, strict=False) if share > unknown]
     return f"hardly anything is known of {', '.join(names)}" if names else ""
 
 
 def _unrefined(
-    model: KinematicModel, values: NDArray[np.float64], misfit: float, iterations: int, reason: str
+    problem: Problem, values: NDArray[np.float64], misfit: float, iterations: int, reason: str
 ) -> Refinement:
-    """Return the start."""
-    return Refinement(values, _uniform_covariance(model), misfit, iterations, False, reason)
+    """Return the start (P,), or (n + m,) of it, with all joints at 0."""
+    start = np.zeros(len(problem.limits))
+    start[: len(values)] = values
+    return Refinement(start, _uniform_covariance(problem), misfit, iterations, False, reason)
 
 
-def _uniform_covariance(model: KinematicModel) -> NDArray[np.float64]:
+def _uniform_covariance(problem: Problem) -> NDArray[np.float64]:
     """Return the covariance (P, P) of values that are known to lie within the limits only."""
-    return np.diag(np.ptp(model.limits, axis=1) ** 2 / 12.0)
-
-
-def _scan(problem: Problem, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Improve the parameters one after another, each by trying values throughout its range."""
-    best, min_misfit = values, problem.misfit(values)
-    for i, (low, high) in enumerate(problem.limits):
-        for value in np.linspace(low, high, problem.settings.starts.scanned):
-            candidate = best.copy()
-            candidate[i] = value
-            misfit = problem.misfit(candidate)
-            if misfit < min_misfit:
-                best, min_misfit = candidate, misfit
-    return best
-
-
-def _above_centroid(model: KinematicModel, observation: Observation) -> NDArray[np.float64]:
-    """Return the prototype, moved horizontally to the centroid of the points."""
-    values = np.zeros(len(model.parameters))
-    if len(observation.points):
-        centroid = observation.points.mean(axis=0)
-        for axis, name in enumerate("xy"):
-            if ("translation", name) in model.transformation.kinds:
-                values[model.transformation.kinds.index(("translation", name))] = centroid[axis]
-    return np.clip(values, *model.limits.T)
-
-
-def _yawed(
-    model: KinematicModel, values: NDArray[np.float64], count: int
-) -> list[NDArray[np.float64]]:
-    """Return the values with yaws throughout their range."""
-    if ("rotation", "z") not in model.transformation.kinds:
-        return [values]
-    yaw = model.transformation.kinds.index(("rotation", "z"))
-    starts = np.repeat(values[None], count, axis=0)
-    starts[:, yaw] = np.linspace(model.limits[yaw, 0], model.limits[yaw, 1], count)
-    return list(starts)
+    return np.diag(np.ptp(problem.limits, axis=1) ** 2 / 12.0)

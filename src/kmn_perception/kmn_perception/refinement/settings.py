@@ -237,6 +237,22 @@ class UnobservableSettings:
 
 
 @dataclass(frozen=True)
+class StateSettings:
+    """When joints are believed to be at 0.
+
+    Attributes
+    ----------
+    sure
+        They have moved where the fit has one by more than this many standard deviations off 0.
+    unexplained
+        They are sought throughout their limits where the misfit exceeds that of the noise by more.
+    """
+
+    sure: NonNegative
+    unexplained: NonNegative
+
+
+@dataclass(frozen=True)
 class RefinementSettings:
     """All settings of the refinement.
 
@@ -251,6 +267,7 @@ class RefinementSettings:
     correlated_rows
         Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
     search, reacquisition, support, curvature, fine, edges, occlusion, misfit, evidence, starts,
+    states,
     unobservable
         Settings of the parts.
     damping
@@ -283,6 +300,7 @@ class RefinementSettings:
     limit_margin: NonNegative
     limit_softness: Annotated[float, Field(gt=0.0, le=1.0)]
     agreement: NonNegative
+    states: StateSettings
 
     def without_retries(self) -> RefinementSettings:
         """Return the settings of a fit that is given up where other starts would be tried."""

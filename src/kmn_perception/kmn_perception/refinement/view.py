@@ -68,7 +68,11 @@ class ModelView(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def model_view(
-    shape: Shape, values: NDArray[np.float64], projection: NDArray[np.float64], contact: float
+    shape: Shape,
+    values: NDArray[np.float64],
+    projection: NDArray[np.float64],
+    contact: float,
+    max_relief: float,
 ) -> ModelView:
     """Return the model at ``values`` (P,) as a camera with a projection (3, 4) sees it.
 
@@ -76,6 +80,9 @@ def model_view(
     ----------
     contact
         An edge this close to another body touches it, metres.
+    max_relief
+        An edge that touches another body is left out if the narrow face that ends there is deeper
+        than this: along it the depth rises, and does not step.
     """
     cubes, cube_jacobians = cuboids(shape, values)
     bodies, parameters = cubes.shape[0], values.shape[0]
@@ -99,7 +106,7 @@ def model_view(
         touching = np.zeros(12, dtype=np.bool_)
         for edge in range(12):
             touching[edge] = _touches(cubes, body, edge, contact)
-        _see_edges(view, body, cube, jacobian, touching)
+        _see_edges(view, body, cube, jacobian, touching, max_relief)
         _bound(view.solids[body], cube)
     return view
 
@@ -146,6 +153,7 @@ def _see_edges(
     cube: NDArray[np.float64],
     jacobian: NDArray[np.float64],
     touching: NDArray[np.bool_],
+    max_relief: float,
 ) -> None:
     """Fill in the body's silhouette: edges between a face that is seen and one that is not."""
     for edge in range(12):
@@ -159,6 +167,8 @@ def _see_edges(
         end = cube[:, 3] + at_first * cube[:, first] + at_second * cube[:, second]
         before = hidden ^ 1  # the face opposite to the hidden one
         crease = touching[edge] and faces_camera(view.solids, body, before)
+        if crease and abs(cube[2, hidden // 2]) > max_relief:
+            continue
         if crease:
             face = before
             if hidden // 2 == first:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -81,9 +82,16 @@ def observe(
     camera: Camera,
     noise: str,
     generator: np.random.Generator,
+    positions: Mapping[str, float] | None = None,
 ) -> Observation:
-    """Return what a camera sees of m(theta, gamma)."""
-    depth = render(model.unit_cubes(*model.split(values)), camera)
+    """Return what a camera sees of m(theta, gamma).
+
+    Parameters
+    ----------
+    positions
+        Of its joints by their names, rad or m; 0 of those that are not named.
+    """
+    depth = render(model.moved_cubes(values, positions or {}), camera)
     return Observation(depth_to_cloud(add_noise(depth, noise, generator), camera), camera)
 
 

@@ -69,7 +69,7 @@ def handle_pose(action: Action, estimate: Estimate, header: Header) -> PoseStamp
     It moves with the joint that is meant, but not with the one that unlatches it: the pose is that
     of a handle at rest.
     """
-    angles = {joint.name: joint.value for joint in estimate.joints}
+    angles = estimate.positions
     if action.unlatch is not None:
         angles[action.unlatch.name] = 0.0
     body = action.grasp.body
@@ -81,7 +81,7 @@ def handle_pose(action: Action, estimate: Estimate, header: Header) -> PoseStamp
 
 def joint_states(estimate: Estimate, header: Header) -> JointState:
     """Return the angles of the object's joints; 0 where they are not estimated."""
-    angles = {joint.name: joint.value for joint in estimate.joints}
+    angles = estimate.positions
     names = [joint.name for joint in estimate.model.joints if joint.moves]
     return JointState(header=header, name=names, position=[angles.get(n, 0.0) for n in names])
 

@@ -27,6 +27,7 @@ from kmn_perception.evaluation.doors.room_statistics import statistics
 from kmn_perception.evaluation.doors.room_tables import room_report
 from kmn_perception.evaluation.hashes import short_hash
 from kmn_perception.evaluation.methods import MethodError
+from kmn_perception.evaluation.moved import evaluate_moved, moved_report, state
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.table import report
 from kmn_perception.evaluation.tally import Tally
@@ -75,6 +76,13 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
         "--peers",
         action="store_true",
         help="compare with the slow peers too: ICP, and the fit without a network",
+    )
+    parser.add_argument(
+        "--states",
+        nargs="+",
+        type=state,
+        metavar="JOINT=POSITION",
+        help="see the object with a joint moved, and tell what the estimates of that are worth",
     )
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     parser.add_argument(
@@ -199,7 +207,10 @@ def main(argv: Sequence[str] | None = None) -> None:
             weights=options.weights,
             paper_weights=options.paper_weights,
         )
-        if has_surroundings(options.model):
+        if options.states:
+            result = evaluate_moved(request, options.states, options.samples)
+            print(moved_report(result))
+        elif has_surroundings(options.model):
             result = evaluate_rooms(request, options.samples, options.jobs)
             print(room_report(result))
         else:

@@ -17,7 +17,7 @@ from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import NONE, columns
 from kmn_perception.configuration.node_parameters import parameter_values, pick
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
-from kmn_perception.evaluation.processes import measurements
+from kmn_perception.training.processes import in_order
 from kmn_perception.evaluation.things import ThingSettings, draw_thing, kinds_of
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render

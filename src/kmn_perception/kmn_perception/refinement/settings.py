@@ -267,8 +267,7 @@ class RefinementSettings:
     correlated_rows
         Number of neighbouring rows (or columns) of pixels whose depth errors may be correlated.
     search, reacquisition, support, curvature, fine, edges, occlusion, misfit, evidence, starts,
-    states,
-    unobservable
+    states, unobservable
         Settings of the parts.
     damping
         Information that damps the steps, per squared pixel of movement.

@@ -17,6 +17,7 @@ TIERS = {
         ("configuration",),
         ("command_line", "model"),
         ("scene", "network", "refinement", "rooms", "transforms"),
+        ("estimate",),
         ("estimator", "doors"),
         ("pipeline_interface", "model_choice"),
         ("pipeline", "door_pipeline"),

@@ -15,7 +15,8 @@ from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.doors.geometry import DOOR
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
-from kmn_perception.estimator import Estimate, EstimatorSettings, Quantity, Status
+from kmn_perception.estimate import Estimate, Quantity, Status
+from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation

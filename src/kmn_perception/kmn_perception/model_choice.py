@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimate import Estimate, Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.network.morph import predict

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.frame_fusion import FrameFusion
-from kmn_perception.estimator import Estimate, EstimatorSettings, Status
+from kmn_perception.estimate import Estimate, Status
+from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_points, render

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimate import Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
 

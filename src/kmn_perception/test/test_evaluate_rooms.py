@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.configuration import resources
-from kmn_perception.evaluation import processes
+from kmn_perception.evaluation import evaluate
 from kmn_perception.evaluation.doors.error_statistics import ERRORS
 from kmn_perception.evaluation.doors.room_comparison import ROOM_METHODS, room_frame
 from kmn_perception.evaluation.evaluate import main
@@ -73,7 +73,7 @@ def test_a_row_of_each_table_is_printed(run: tuple[dict[str, Any], str]) -> None
 def test_several_processes_find_the_same_as_one(
     run: tuple[dict[str, Any], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(processes, "MIN_SAMPLES", 1)
+    monkeypatch.setattr(evaluate, "WORTHWHILE", 1)
     again = _run(tmp_path, "--jobs", "2")[0]["methods"]
     for name, method in run[0]["methods"].items():
         for statistics in (method, again[name]):

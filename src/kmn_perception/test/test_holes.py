@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.model.rendering import render
 from kmn_perception.pipeline import MorphPipeline
 from kmn_perception.scene.depth_view import DepthView

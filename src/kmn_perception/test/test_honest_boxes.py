@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.evaluation.coverage import is_covered
 from kmn_perception.experiments.upright_box import UprightBox
 from kmn_perception.model.camera import Camera, look_at

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from std_msgs.msg import Header
 
-from kmn_perception.estimator import Estimate, Status
+from kmn_perception.estimate import Estimate, Status
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import markers_from_estimates
 

@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from kmn_perception.configuration.node_parameters import parameter_values, pick
-from kmn_perception.estimator import Estimate, EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimate import Estimate, Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.evaluation.evaluate_models import main
 from kmn_perception.evaluation.things import ThingSettings, draw_thing, kinds_of
 from kmn_perception.model.camera import Camera

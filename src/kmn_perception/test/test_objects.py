@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.model.camera import Camera, look_at
 from kmn_perception.model.rendering import depth_to_points, render
 from kmn_perception.model.sensor_noise import add_noise

@@ -8,7 +8,7 @@ from pkgutil import walk_packages
 import numba
 
 import kmn_perception
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.scene.depth_view import DepthView
 
 from .conftest import RealFrame, tabletop_pipeline

@@ -11,7 +11,8 @@ import yaml
 from std_msgs.msg import Header
 
 from kmn_perception.configuration.node_parameters import parameter_values
-from kmn_perception.estimator import Estimate, MorphEstimator, Status
+from kmn_perception.estimate import Estimate, Status
+from kmn_perception.estimator import MorphEstimator
 from kmn_perception.evaluation.evaluate import main
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.pipeline import MorphPipeline
@@ -90,18 +91,18 @@ def test_what_is_published_is_where_the_joint_is() -> None:
     estimate, truth = estimated("drawer", -0.1, "none", 0)
     assert estimate.status is Status.OK, estimate.reason
     model = estimator_of("drawer").model
-    message = parameters_from_estimate(model, estimate, Header())
+    message = parameters_from_estimate(estimate, Header())
     assert message.joint_names == ["slide"]
     assert message.joint_positions[0] == pytest.approx(-0.1, abs=0.001)
     assert message.joint_deviations[0] > 0.0
-    states = joint_states(model, estimate, Header())
+    states = joint_states(estimate, Header())
     assert dict(zip(states.name, states.position, strict=True))["slide"] == pytest.approx(
         -0.1, abs=0.001
     )
     truly = model.moved_cubes(truth, {"slide": -0.1})
     bodies = MorphPipeline(estimator_of("drawer"), SETTINGS.pipeline).bodies(estimate)
     np.testing.assert_allclose(bodies, truly, atol=0.003)
-    place = handle_pose(model, model.actions[0], estimate, Header()).pose.position
+    place = handle_pose(model.actions[0], estimate, Header()).pose.position
     np.testing.assert_allclose([place.x, place.y, place.z], truly[2, :3, 3], atol=0.003)
 
 

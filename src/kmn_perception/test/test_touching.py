@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kmn_perception.configuration.resources import share_directory
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.experiments.experiment import TABLETOP, load_pipeline
 from kmn_perception.experiments.labelled_frame import read_frames
 from kmn_perception.experiments.reference import measure

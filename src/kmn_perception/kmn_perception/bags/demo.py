@@ -23,7 +23,7 @@ from kmn_perception.bags.example_bag import CAMERA, load_frames, make_example_ba
 from kmn_perception.bags.replay import Replay
 from kmn_perception.command_line.arguments import output_folder
 from kmn_perception.configuration import resources
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import depth_to_points

@@ -16,15 +16,18 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import NONE, columns
 from kmn_perception.configuration.node_parameters import parameter_values, pick
-from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
-from kmn_perception.training.processes import in_order
+from kmn_perception.estimate import Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.evaluation.things import ThingSettings, draw_thing, kinds_of
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.sensor_noise import NOISES, add_noise
 from kmn_perception.model_choice import ModelChoice
+from kmn_perception.network.threads import use_one_thread
+from kmn_perception.training.processes import in_order
 from kmn_perception.training.samples import EVALUATION, sample
 
+WORTHWHILE = 20  # samples of a process; for fewer its start, some seconds, does not pay
 THINGS = (2,)  # spawn key that sets their random numbers apart from those of objects
 
 
@@ -142,7 +145,8 @@ def main(command: Sequence[str] | None = None) -> int:
         make = partial(ModelMeasurement, models, options.seed, options.noise, options.samples)
         measure = make()
         count = 2 * options.samples
-        found = measurements(measure, make, count, options.jobs)
+        use_one_thread()
+        found = in_order(make, range(count), options.jobs, WORTHWHILE)
         told = list(tqdm(found, desc="evaluate_models", unit=" samples", total=count))
         print(table(told, [model.name for model in measure.choice.models]))
     except KeyboardInterrupt:

@@ -13,7 +13,8 @@ import numpy as np
 
 from kmn_perception.command_line.columns import columns, text
 from kmn_perception.configuration.node_parameters import parameter_values
-from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimate import Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.evaluation.comparison import CONFIDENCE, Request
 from kmn_perception.evaluation.coverage import chi2_quantile, is_covered
 from kmn_perception.evaluation.methods import MethodError

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration.node_parameters import parameter_values
-from kmn_perception.estimator import EstimatorSettings, MorphEstimator, Status
+from kmn_perception.estimate import Status
+from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.experiments.baselines import BASELINES
 from kmn_perception.experiments.labelled_frame import LabelledFrame
 from kmn_perception.experiments.reference import References, measure

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.experiments.experiment import FrameResult
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.pipeline_interface import ObjectEstimate

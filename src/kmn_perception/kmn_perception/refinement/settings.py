@@ -18,6 +18,7 @@ from kmn_perception.configuration.settings import (
     load_settings,
 )
 from kmn_perception.refinement.edge_settings import EdgeSettings
+from kmn_perception.refinement.start_settings import StartSettings, StateSettings
 from kmn_perception.refinement.support_settings import CurvatureSettings, SupportSettings
 
 Window = Annotated[float, Field(ge=1.0, le=64.0)]
@@ -182,31 +183,6 @@ class EvidenceSettings:
 
 
 @dataclass(frozen=True)
-class StartSettings:
-    """Other starts than the estimate.
-
-    Attributes
-    ----------
-    yaws
-        Number of yaws, spread over the range, that are compared where there is no estimate.
-    fitted
-        Number of the best of these from which the model is fitted.
-    scanned
-        Number of values of each parameter, spread over its range, that are tried after a bad fit.
-    around
-        Number of yaws of the cuboids around the points that are tried after a fit that is not good.
-    rest
-        Fraction of the points that lies beyond each of their sides.
-    """
-
-    yaws: Annotated[int, Field(ge=1, le=100)]
-    fitted: Annotated[int, Field(ge=1, le=100)]
-    scanned: Annotated[int, Field(ge=1, le=100)]
-    around: Annotated[int, Field(ge=1, le=100)]
-    rest: Fraction
-
-
-@dataclass(frozen=True)
 class UnobservableSettings:
     """Directions in the space of the parameters that the view does not show.
 
@@ -234,22 +210,6 @@ class UnobservableSettings:
     passes: Count
     longer: Positive
     unknown: Fraction
-
-
-@dataclass(frozen=True)
-class StateSettings:
-    """When joints are believed to be at 0.
-
-    Attributes
-    ----------
-    sure
-        They have moved where the fit has one by more than this many standard deviations off 0.
-    unexplained
-        They are sought throughout their limits where the misfit exceeds that of the noise by more.
-    """
-
-    sure: NonNegative
-    unexplained: NonNegative
 
 
 @dataclass(frozen=True)

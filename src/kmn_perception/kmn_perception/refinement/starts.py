@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.refinement.problem import Problem
-from kmn_perception.refinement.settings import StartSettings
+from kmn_perception.refinement.start_settings import StartSettings
 
 
 def above_centroid(model: KinematicModel, observation: Observation) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.estimator import Estimate, Status
+from kmn_perception.estimate import Estimate, Status
 from kmn_perception.pipeline_interface import Pipeline
 from kmn_perception.ros.messages import markers_from_estimates, parameters_from_estimate
 

@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
 from kmn_perception.doors.frame_fusion import FrameFusion
-from kmn_perception.estimator import Estimate, Status
+from kmn_perception.estimate import Estimate, Status
 from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
 from kmn_perception.ros.camera_poses import CameraPoses
 from kmn_perception.ros.frame_estimates import DetectedObject, FrameEstimates

@@ -18,7 +18,7 @@ from kmn_perception.model.object_urdf import object_urdf
 from kmn_perception.ros.messages import objects as messages
 
 if TYPE_CHECKING:
-    from kmn_perception.estimator import Estimate
+    from kmn_perception.estimate import Estimate
 
 QUEUE_DEPTH = 10
 

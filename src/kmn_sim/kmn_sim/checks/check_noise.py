@@ -14,7 +14,7 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.configuration import resources
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.experiments.experiment import TABLETOP, load_pipeline
 from kmn_perception.experiments.labelled_frame import TABLE, LabelledFrame, read_frames
 from kmn_perception.model.camera import Camera

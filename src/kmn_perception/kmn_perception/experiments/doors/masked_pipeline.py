@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.geometry import DOOR
-from kmn_perception.estimator import Status
+from kmn_perception.estimate import Status
 from kmn_perception.evaluation.doors.errors import DoorPlace, door_place
 from kmn_perception.evaluation.doors.label import DoorLabel
 from kmn_perception.experiments.doors.frames import DoorFrame

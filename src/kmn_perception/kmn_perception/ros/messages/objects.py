@@ -31,7 +31,7 @@ from kmn_perception.model.object_urdf import rigid_pose
 from kmn_perception.model.rotation import quaternion_from_matrix
 
 if TYPE_CHECKING:  # the estimator brings torch, which those who only read clouds do not need
-    from kmn_perception.estimator import Estimate
+    from kmn_perception.estimate import Estimate
 
 STEP = 1e-6  # of theta, for derivatives
 CORNERS = np.array([[x, y, z, 2.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0

@@ -15,7 +15,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.rotation import quaternion_from_matrix
 
 if TYPE_CHECKING:  # the estimator brings torch, which those who only read clouds do not need
-    from kmn_perception.estimator import Estimate
+    from kmn_perception.estimate import Estimate
 
 VALID_COLOUR = ColorRGBA(r=0.18, g=0.84, b=0.42, a=0.5)
 INVALID_COLOUR = ColorRGBA(r=0.94, g=0.38, b=0.24, a=0.5)

@@ -158,7 +158,8 @@ def _candidate(estimator: MorphEstimator, observation: Observation) -> Candidate
 
 def _log_evidence(estimator: MorphEstimator, observation: Observation, estimate: Estimate) -> float:
     """Return the logarithm of the evidence for a model; minus infinity without an estimate."""
-    values = np.concatenate([estimate.theta, estimate.gamma])
+    positions = [joint.value for joint in estimate.joints]
+    values = np.array([*estimate.theta, *estimate.gamma, *positions])
     if not np.isfinite(values).all():
         return -math.inf
     return log_evidence(estimator.model, observation, values, estimator.refinement)

@@ -24,7 +24,7 @@ from kmn_perception.refinement import RefinementSettings, log_evidence
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.scene.camera_pose import CameraPose
 from kmn_perception.scene.depth_view import DepthView
-from kmn_perception.training.samples import EVALUATION, sample
+from kmn_perception.training.samples import EVALUATION, observe, sample
 
 from .conftest import cuboid
 
@@ -72,6 +72,18 @@ def test_what_explains_it_better_and_is_refused_makes_it_none_of_the_others() ->
     told = best_explained([candidate("drawer", -800.0), refused], EQUAL)
     assert (told.model.name, told.status) == ("lid", Status.NOT_CONVERGED)
     assert told.reason == "'lid' explains it best, and not well enough: its bar is missing"
+
+
+@pytest.mark.parametrize("position", [-0.03, -0.15])
+def test_an_object_that_stands_open_is_explained_as_it_stands(position: float) -> None:
+    model, generator = MODELS["drawer"], np.random.default_rng(5)
+    values = model.sample(generator, 1)[0]
+    observation = observe(model, values, model.camera, "kinect", generator, {"slide": position})
+    estimate = choice("lid", "drawer", "cupboard_door").estimate(observation)
+    assert (estimate.model.name, estimate.status) == ("drawer", Status.OK), estimate.reason
+    assert estimate.positions["slide"] == pytest.approx(position, abs=0.005)
+    closed = log_evidence(model, observation, values, SETTINGS)
+    assert log_evidence(model, observation, np.append(values, position), SETTINGS) > closed + EQUAL
 
 
 def test_without_anything_to_explain_the_reason_is_as_it_is() -> None:

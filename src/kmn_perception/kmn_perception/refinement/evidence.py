@@ -31,9 +31,11 @@ def log_evidence(
     Parameters
     ----------
     values
-        (P,) of the fit.
+        (P,) of the fit: (theta, gamma), and the positions of free joints if it has any.
     """
     evidence, problem = settings.evidence, Problem.of(model, observation, settings)
+    if len(values) > len(model.parameters):
+        problem = problem.freed(model)
     measurements = len(problem.image.pixels) / evidence.correlated_pixels
     if measurements < 1.0:
         return -math.inf

@@ -85,11 +85,17 @@ def fit_once(
     values: NDArray[np.float64],
     settings: RefinementSettings,
 ) -> NDArray[np.float64]:
-    """Return the fit (P,) from one start (P,), neither judged nor with a covariance."""
+    """Return the fit from one start (n + m,), neither judged nor with a covariance.
+
+    It is of (theta, gamma) and the positions of the joints that are free, if there are any.
+    """
     problem = Problem.of(model, observation, settings)
-    return (
-        values if len(problem.image.pixels) < settings.min_points else fit(problem, values).values
-    )
+    if len(problem.image.pixels) < settings.min_points:
+        return values
+    values = fit(problem, values).values
+    if not model.states:
+        return values
+    return fit(problem.freed(model), np.append(values, np.zeros(len(model.states)))).values
 
 
 def refine_from_scratch(

@@ -50,7 +50,7 @@ evaluate: build  ## regenerate docs/results, table and figures (half an hour; in
 .PHONY: test
 test: build lint $(READY)simulation  ## run the style checks and all tests
 	@echo "==> Testing"
-	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m pytest $(TESTS)
+	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m pytest --durations=30 $(TESTS)
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) and types (mypy)

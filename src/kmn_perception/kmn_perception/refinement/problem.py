@@ -57,7 +57,8 @@ class Problem:
         """Return the problem with the joints free whose positions are estimated."""
         free = model.states
         limits = np.array([*model.limits, *(joint.limits for joint in free)])
-        return replace(self, shape=shape_of(model, free), limits=limits)
+        settings = self.settings.without_retries()  # positions are searched instead
+        return replace(self, shape=shape_of(model, free), limits=limits, settings=settings)
 
     @cached_property
     def half_range(self) -> NDArray[np.float64]:

@@ -131,6 +131,8 @@ def _refined(
         return at_rest
     settings, freed = problem.settings, problem.freed(model)
     closed = np.concatenate([at_rest.values, np.zeros(len(model.states))])
+    if at_rest.misfit > settings.states.hopeless:
+        return at_rest._replace(values=closed, covariance=_uniform_covariance(freed))
     loose = fit(freed, closed)
     evidence = JointEvidence.of(freed, loose, len(model.states))
     plausible = not at_rest.reason and problem.explains(at_rest.misfit)
@@ -140,7 +142,9 @@ def _refined(
     if not free.reason and problem.explains(free.misfit):
         return free
     moved = [at for values in (at_rest.values, start) for at in with_joints_moved(freed, values)]
-    found = sorted((search(freed, values) for values in moved), key=freed.misfit)
+    moved.sort(key=freed.misfit)
+    likely = moved[: 2 * settings.starts.fitted]
+    found = sorted((search(freed, values) for values in likely), key=freed.misfit)
     fits = [loose, *(fit(freed, values) for values in found[: settings.starts.fitted])]
     return _best(model, freed, points, closed, fits)
 

@@ -45,7 +45,10 @@ class StateSettings:
         They have moved where the fit has one by more than this many standard deviations off 0.
     unexplained
         They are sought throughout their limits where the misfit exceeds that of the noise by more.
+    hopeless
+        Larger misfits of the closed object are not those of the object in another position.
     """
 
     sure: NonNegative
     unexplained: NonNegative
+    hopeless: NonNegative

@@ -125,9 +125,9 @@ def _see_faces(
         for side in range(2):
             offset = side - 0.5 + (row * cube[:, 3]).sum()
             face = 2 * axis + side
+            if abs(offset) < MIN_OFFSET:  # a face in a plane with the camera does not face it
+                offset = (2 * side - 1) * MIN_OFFSET
             view.solids[body, FACES_CAMERA + face] = 1.0 if (2 * side - 1) * offset < 0.0 else 0.0
-            if abs(offset) < MIN_OFFSET:
-                offset = MIN_OFFSET
             view.solids[body, PLANES + 3 * face : PLANES + 3 * face + 3] = row / offset
             for i in range(jacobian.shape[2]):
                 row_derivative = np.zeros(3)

@@ -75,7 +75,7 @@ class RobotListener:
             simulated = self._time_is_simulated()
             if simulated:
                 self._node.set_parameters([Parameter("use_sim_time", value=True)])
-                self._spin(discovery, lambda: self._node.get_clock().now().nanoseconds > 0)
+                self._spin(duration, lambda: self._node.get_clock().now().nanoseconds > 0)
             for received in (self.joints, self.odometry, self.cameras, self.doors):
                 received.clear()
             self._spin(duration)

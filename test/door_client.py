@@ -134,9 +134,7 @@ class DoorClient(GraphClient):
         self.feedback.clear()
         self.sent.clear()
         goal = OpenDoor.Goal(**{**PULL, **angles})
-        return self.wait(
-            self.action.send_goal_async(goal, lambda m: self.feedback.append(m.feedback))
-        )
+        return self.send_goal(self.action, goal, lambda m: self.feedback.append(m.feedback))
 
     def result(self, handle: Any) -> tuple[int, OpenDoor.Result]:
         answer = self.wait(handle.get_result_async())

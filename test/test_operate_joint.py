@@ -38,9 +38,7 @@ class DrawerClient(TrueDoorClient):
         """Send a goal, and return how it ended."""
         self.told.clear()
         request = OperateJoint.Goal(**{"target": math.nan, **goal})
-        handle = self.wait(
-            self.operate.send_goal_async(request, lambda m: self.told.append(m.feedback))
-        )
+        handle = self.send_goal(self.operate, request, lambda m: self.told.append(m.feedback))
         answer = self.wait(handle.get_result_async())
         return answer.status, answer.result
 
@@ -109,11 +107,8 @@ def test_the_drawer_is_opened_as_far_as_its_file_says(system: DrawerClient) -> N
 def test_the_same_by_the_door_s_action(system: DrawerClient) -> None:
     """Its angles are then metres; what it is not for it does not refuse."""
     system.start_anew()
-    answer = system.wait(
-        system.wait(
-            system.action.send_goal_async(OpenDoor.Goal(handle_angle=0.0, door_angle=-0.2))
-        ).get_result_async()
-    )
+    handle = system.send_goal(system.action, OpenDoor.Goal(handle_angle=0.0, door_angle=-0.2))
+    answer = system.wait(handle.get_result_async())
     assert answer.result.success
     assert answer.result.door_angle == pytest.approx(-0.2, abs=0.02)
 

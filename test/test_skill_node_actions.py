@@ -74,7 +74,7 @@ def test_a_controller_that_somebody_takes_over_ends_the_goal_and_is_named(
         now = dict(zip(newest.name, newest.position, strict=True))
         there = trajectory((0.05, *(now[name] for name in ARM.joints)), names=ARM.joints)
         since, _ = system.state()
-        system.wait(system.arm.send_goal_async(FollowJointTrajectory.Goal(trajectory=there)))
+        system.send_goal(system.arm, FollowJointTrajectory.Goal(trajectory=there))
         system.assert_it_stops(since, 0.4)
     status, result = system.result(handle)
     assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)

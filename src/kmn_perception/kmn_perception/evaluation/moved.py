@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import fields
 from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kmn_perception.command_line.columns import columns, text
-from kmn_perception.configuration.node_parameters import parameter_values
+from kmn_perception.configuration.node_parameters import parameter_values, pick
 from kmn_perception.estimate import Status
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.evaluation.comparison import CONFIDENCE, Request
@@ -94,8 +93,7 @@ def evaluate_moved(request: Request, states: Sequence[State], samples: int) -> d
     if noise not in NOISES:
         raise MethodError(f"noise must be {', '.join(NOISES)}, found '{noise}'")
     use_one_thread()
-    values = parameter_values("morph_node")
-    settings = EstimatorSettings(**{f.name: values[f.name] for f in fields(EstimatorSettings)})
+    settings = pick(EstimatorSettings, parameter_values("morph_node"))
     estimator = MorphEstimator.load(request.model, request.weights or "", settings)
     estimator.warm_up()
     found = {

@@ -242,6 +242,16 @@ def test_a_process_that_dies_while_it_plans_is_replaced(planner: Planner) -> Non
     assert found.report.seed_used != "pull"  # the guess that it died with is left out
 
 
+def test_whatever_goes_wrong_in_its_process_is_told_and_the_next_request_served(
+    planner: Planner,
+) -> None:
+    restarts = planner.restarts
+    with pytest.raises(PlanningFailed, match="the solver failed: "):
+        planner.plan(request(gamma=np.zeros((4, 1))))
+    assert planner.restarts == restarts
+    assert planner.plan(request()).report.contact_error <= SETTINGS.check.contact
+
+
 def test_a_cancelled_plan_ends_at_once_and_the_next_one_works(planner: Planner) -> None:
     begin = time.monotonic()
     with pytest.raises(PlanningCancelled):

@@ -64,6 +64,21 @@ def test_a_hand_at_the_handle_opens_and_draws_straight_back(
     assert found.object_joints[last] == pytest.approx([request.object_start[0], 0.0])
 
 
+@pytest.mark.parametrize("short", [0, 2, 5])
+def test_an_open_hand_at_the_handle_draws_back_too(
+    planner: Planner, plan: Plan, short: int
+) -> None:
+    here = plan.phase("reach").last - short
+    request = replace(FIRST, start=plan.positions[here])
+    restarts = planner.restarts
+    found = planner.plan(request)
+    assert planner.restarts == restarts
+    check(found, request, World(SETUP, request.theta, request.gamma))
+    assert [each.name for each in found.phases] == ["release", "reach", "grasp", "press", "open"]
+    away = found.positions[found.phases[0].last, :2] - request.start[:2]
+    assert np.linalg.norm(away) == pytest.approx(-POLICY.pre_grasp)
+
+
 def test_a_handle_that_stands_a_little_beyond_its_limit_is_no_hindrance(
     planner: Planner, plan: Plan
 ) -> None:

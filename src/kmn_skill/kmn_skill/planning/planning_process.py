@@ -46,8 +46,9 @@ def _answer(connection: Connection, setup: PlanningSetup) -> None:
             connection.send(solver.plan(request, guess.solution, guess.name))
         except (PlanRejected, ConfigurationError) as error:
             connection.send(str(error))
-        except RuntimeError as error:  # what the package robotic raises
-            connection.send(f"the solver failed: {str(error).splitlines()[0]}")
+        except Exception as error:  # whatever robotic and toppra raise: the next request is served
+            why = str(error).splitlines() or [type(error).__name__]
+            connection.send(f"the solver failed: {why[0]}")
 
 
 def _silence() -> None:

@@ -61,15 +61,16 @@ class Solver:
         world = self.world(request)
         if robot.is_fixed:
             check_reach(world, request)
-        first = np.vstack([request.configuration, release(world, request, settings)])
-        begin = replace(request, start=first[-1, ROBOT], object_start=first[-1, OBJECT_JOINTS])
+        letting_go = release(world, request, settings)
+        first = letting_go[-1][-1] if letting_go else request.configuration
+        begin = replace(request, start=first[ROBOT], object_start=first[OBJECT_JOINTS])
         guessed = transfer(guess, self._setup.model, self._setup.action, begin)
         path = self._solve(world, begin, self._standing(guessed, begin))
         path = self._standing(path, begin)  # exactly
         try:
             plan = timed_plan(path, begin, world)
-            if len(first) > 1:
-                plan = preceded(plan, first, world)
+            if letting_go:
+                plan = preceded(plan, letting_go, world)
         except MotionError as error:
             raise PlanRejected(str(error)) from error
         plan = replace(plan, report=replace(plan.report, seed_used=name))

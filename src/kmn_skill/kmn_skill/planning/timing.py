@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -90,36 +91,32 @@ def timed_plan(path: NDArray[np.float64], request: PlanRequest, world: World) ->
     )
 
 
-def preceded(plan: Plan, path: NDArray[np.float64], world: World) -> Plan:
+def preceded(plan: Plan, motions: Sequence[NDArray[np.float64]], world: World) -> Plan:
     """Return a plan that first lets go of the handle.
 
     Parameters
     ----------
-    path
-        (R + 1, D) positions, with the start, up to where the plan begins: in its first half the
-        gripper opens, in the other one the hand draws back.
+    motions
+        (R + 1, D) positions of each motion, from rest to rest, up to where the plan begins.
 
     Raises
     ------
     MotionError
         If the path cannot be followed.
     """
-    speed, opened = world.setup.settings.timing.approach_speed, (len(path) - 1) // 2
-    opening = _stretch(path[: opened + 1], world, speed)
-    leaving = _stretch(path[opened:], world, speed)
-    count = len(opening.times) + len(leaving.times) - 2
+    speed, led = world.setup.settings.timing.approach_speed, plan
+    for motion in reversed(motions):
+        before = _stretch(motion, world, speed)
+        led = replace(
+            led,
+            times=np.concatenate([before.times, before.times[-1] + led.times[1:]]),
+            positions=np.vstack([before.positions, led.positions[1:]]),
+            velocities=np.vstack([before.velocities, led.velocities[1:]]),
+            object_joints=np.vstack([before.object_joints, led.object_joints[1:]]),
+        )
+    count = len(led.times) - len(plan.times)
     phases = [Phase(name, first + count, last + count) for name, first, last in plan.phases]
-    left = opening.times[-1] + leaving.times
-    return replace(
-        plan,
-        times=np.concatenate([opening.times, left[1:], left[-1] + plan.times[1:]]),
-        positions=np.vstack([opening.positions, leaving.positions[1:], plan.positions[1:]]),
-        velocities=np.vstack([opening.velocities, leaving.velocities[1:], plan.velocities[1:]]),
-        object_joints=np.vstack(
-            [opening.object_joints, leaving.object_joints[1:], plan.object_joints[1:]]
-        ),
-        phases=(Phase(PhaseName.RELEASE, 0, count), *phases),
-    )
+    return replace(led, phases=(Phase(PhaseName.RELEASE, 0, count), *phases))
 
 
 def _stretch(nodes: NDArray[np.float64], world: World, near_speed: float) -> Stretch:

@@ -16,7 +16,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -37,6 +36,7 @@ from kmn_skill.experiments.settings import Experiment
 from kmn_skill.experiments.stopwatch import Measured, Stopwatch
 from kmn_skill.planning.layout import MOVED
 from kmn_skill.planning.surroundings import WALL
+from kmn_skill.ros.locked_action_client import LockedActionClient
 
 QUEUE_DEPTH = 10
 ON_ROBOT = "base"  # where sim_node has a camera that moves with the robot
@@ -242,7 +242,7 @@ class DoorSystem:
         watch = self._stopwatch
         node.create_subscription(WrenchStamped, "handle_force", watch.on_force, QUEUE_DEPTH)
         node.create_subscription(DiagnosticArray, "/diagnostics", watch.on_reports, QUEUE_DEPTH)
-        self._action = ActionClient(node, OperateJoint, "operate_joint")
+        self._action = LockedActionClient(node, OperateJoint, "operate_joint")
         self._setting = node.create_client(
             SetParametersAtomically, "sim_node/set_parameters_atomically"
         )

@@ -10,7 +10,6 @@ from types import FrameType
 
 import rclpy
 from action_msgs.msg import GoalStatus
-from rclpy.action.client import ActionClient
 from rclpy.node import Node
 
 from kmn_msgs.action import OpenDoor
@@ -22,6 +21,7 @@ from kmn_skill.experiments.narrator import Narrator
 from kmn_skill.experiments.settings import MODES, Experiment
 from kmn_skill.planning.prototypes import PULL
 from kmn_skill.ros.error_codes import code_name
+from kmn_skill.ros.locked_action_client import LockedActionClient
 
 ACTION = "open_door"
 POLL_PERIOD = 0.1  # seconds
@@ -38,7 +38,7 @@ class DoorOpener:
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._node, self._timeout = node, timeout
-        self._action = ActionClient(node, OpenDoor, ACTION)
+        self._action = LockedActionClient(node, OpenDoor, ACTION)
         self._interrupted = False
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:

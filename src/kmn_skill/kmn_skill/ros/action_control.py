@@ -12,7 +12,6 @@ from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.action import GripperCommand as GripperAction
 from numpy.typing import NDArray
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
@@ -23,6 +22,7 @@ from kmn_skill.execution.gripper_commands import GripperCommand, gripper_command
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.ros import messages
+from kmn_skill.ros.locked_action_client import LockedActionClient
 from kmn_skill.ros.velocity_control import VelocityControl
 
 QUEUE_DEPTH = 10
@@ -130,7 +130,7 @@ class ActionControl:
             for name, each in controllers.items()
         }
         self._clients = {
-            name: ActionClient(node, ACTIONS[each.type], each.name)
+            name: LockedActionClient(node, ACTIONS[each.type], each.name)
             for name, each in controllers.items()
             if each.type in ACTIONS
         }

@@ -128,7 +128,8 @@ def test_a_velocity_that_is_not_finite_is_refused_and_counted(system: BaseClient
 
 
 def test_a_door_is_opened_by_a_base_that_takes_velocities(system: BaseClient) -> None:
-    system.assert_it_opens()
+    with system.pace(1.0):  # odometry that comes late on a busy machine is off by its delay
+        system.assert_it_opens()
     assert not system.sent
 
 
@@ -157,7 +158,8 @@ def test_odometry_that_stops_ends_the_goal_and_the_next_one_is_served(system: Ba
     system.graph.wait_for(lambda: abs(system.base()[4:]).max() < STILL)
     assert system.fail().startswith(("odom stopped", "odom is"))  # by when it came, or its stamp
     system.tells_odometry = True
-    system.assert_it_opens()
+    with system.pace(1.0):
+        system.assert_it_opens()
 
 
 def test_a_robot_whose_base_takes_velocities_has_no_trajectory_of_all_joints(

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import PATIENT, TrueDoorClient  # noqa: E402
 from kmn_skill.planning.robot import RobotModel  # noqa: E402
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 from sim_client import trajectory  # noqa: E402
 
@@ -27,7 +27,7 @@ class ControllerClient(TrueDoorClient):
 
     def __init__(self, graph: Any) -> None:
         super().__init__(graph)
-        self.arm = ActionClient(self, FollowJointTrajectory, ARM.name)
+        self.arm = LockedActionClient(self, FollowJointTrajectory, ARM.name)
 
 
 @pytest.fixture(scope="module")
@@ -93,13 +93,13 @@ def test_a_newer_goal_ends_the_one_that_runs_if_that_is_allowed(system: Controll
         assert (status, result.success) == (GoalStatus.STATUS_ABORTED, False)
         assert result.reason == "a newer goal took its place"
         system.wait_for_phase("reach", 0.1)
-        third = system.send()
-        fourth = system.send()
-        assert system.result(second)[0] == GoalStatus.STATUS_ABORTED
-        assert system.result(third)[0] == GoalStatus.STATUS_ABORTED
-        system.wait(fourth.cancel_goal_async())
-        assert system.result(fourth)[0] == GoalStatus.STATUS_CANCELED
+        waiting = [system.send() for _ in range(4)]
+        newest = system.send()
+        for each in (second, *waiting):  # in the order in which they came, none after the newest
+            assert system.result(each)[0] == GoalStatus.STATUS_ABORTED
+        system.wait(newest.cancel_goal_async())
+        assert system.result(newest)[0] == GoalStatus.STATUS_CANCELED
     finally:
         assert system.set(preempt=False).successful
     reports = system.report()
-    assert int(reports["goals_preempted"]) == 3
+    assert int(reports["goals_preempted"]) == 6

@@ -51,7 +51,6 @@ class GoalServer:
     ) -> None:
         self._node, self._pursue = node, pursue
         self._statistics, self._warnings, self._preempts = statistics, warnings, preempts
-        self._lock = threading.Lock()  # one goal at a time
         self._accepted: list[Unwanted] = []  # goals that have not ended, the newest one last
         self._ending = Unwanted()  # of the node
         self._workers: list[threading.Thread] = []
@@ -106,7 +105,8 @@ class GoalServer:
         unwanted = next(each for each in self._accepted if each.take())
         done = Future()
         done.add_done_callback(lambda _: executor.wake())
-        arguments = (interface, goal_handle, unwanted, done)
+        before = self._workers[-1:]
+        arguments = (interface, goal_handle, unwanted, before, done)
         worker = threading.Thread(target=self._work, args=arguments, name="goal")
         self._workers = [*(each for each in self._workers if each.is_alive()), worker]
         worker.start()
@@ -119,14 +119,16 @@ class GoalServer:
         interface: GoalInterface,
         goal_handle: ServerGoalHandle,
         unwanted: Unwanted,
+        before: Sequence[threading.Thread],
         done: Future,
     ) -> None:
         client = GoalClient(goal_handle, interface, (self._ending, unwanted), self._statistics)
         result = Result("internal_error", "the goal did not begin")
         try:
-            with self._lock:  # until the one before has come to its end
-                result = self._try(lambda: interface.goal(goal_handle.request), client)
-                self._finish(goal_handle, result)
+            for worker in before:  # one goal at a time, in the order in which they came
+                worker.join()
+            result = self._try(lambda: interface.goal(goal_handle.request), client)
+            self._finish(goal_handle, result)
         finally:
             done.set_result(result)
 

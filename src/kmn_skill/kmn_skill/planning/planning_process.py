@@ -47,8 +47,8 @@ def _answer(connection: Connection, setup: PlanningSetup) -> None:
         except (PlanRejected, ConfigurationError) as error:
             connection.send(str(error))
         except Exception as error:  # whatever robotic and toppra raise: the next request is served
-            why = str(error).splitlines() or [type(error).__name__]
-            connection.send(f"the solver failed: {why[0]}")
+            first, *_ = str(error).splitlines() or [""]
+            connection.send(f"the solver failed: {type(error).__name__}: {first}")
 
 
 def _silence() -> None:

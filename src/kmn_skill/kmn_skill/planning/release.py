@@ -13,8 +13,6 @@ from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.settings import SkillSettings
 from kmn_skill.planning.world import GRASP, TOOL, World
 
-ALIKE = 1e-3  # m and rad, by which a configuration that is another one differs
-
 
 def release(
     world: World, request: PlanRequest, settings: SkillSettings
@@ -44,11 +42,9 @@ def release(
     drawn_back[BASE_POSITION] -= distance * tool[:2, 0] / np.linalg.norm(tool[:2, 0])
     # The start is as measured: a joint may stand a little beyond its limit.
     opened, drawn_back = np.clip([opened, drawn_back], *world.limits())
-    places = (
-        [start, drawn_back]
-        if np.allclose(start, opened, 0.0, ALIKE)
-        else [start, opened, drawn_back]
-    )
+    places = [start, opened, drawn_back]
+    if np.allclose(start, opened, rtol=0.0, atol=settings.check.start):
+        places.pop(1)  # it is open already
     steps = np.linspace(0.0, 1.0, settings.planner.release + 1)[:, None]
     smooth = steps**2 * (3.0 - 2.0 * steps)  # from rest to rest
     return [a + smooth * (b - a) for a, b in pairwise(places)]

@@ -12,7 +12,6 @@ from action_msgs.msg import GoalStatus
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -26,6 +25,7 @@ from kmn_msgs.msg import MorphingParameters
 from kmn_perception.ros.parameters import request_to_set
 from kmn_perception.ros.stamps import seconds
 from kmn_sim.ros.sim_node import SimNode
+from kmn_skill.ros.locked_action_client import LockedActionClient
 from sim_client import STILL, time_to_rest
 
 SEED = 3  # of a door that is wholly in view
@@ -74,7 +74,7 @@ class DoorClient(GraphClient):
         self.parameters = self.create_publisher(MorphingParameters, "morphing_parameters", 10)
         self.trajectory = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
         self.reset = self.create_client(Trigger, "reset")
-        self.action = ActionClient(
+        self.action = LockedActionClient(
             self, OpenDoor, "open_door", feedback_sub_qos_profile=QoSProfile(depth=ALL)
         )
         self._simulator_setting = self.create_client(

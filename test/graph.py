@@ -97,13 +97,8 @@ class GraphClient(Node):
         return future.result()
 
     def send_goal(self, client: Any, goal: Any, feedback: Any = None) -> Any:
-        """Return the handle of a goal, sent in the executor's thread.
-
-        rclpy ignores an answer that another thread takes before it has noted who asked.
-        """
-        assert self.executor is not None
-        sending = self.executor.create_task(client.send_goal_async, goal, feedback)
-        return self.wait(self.wait(sending))
+        """Return the handle of a goal, which a `LockedActionClient` sends."""
+        return self.wait(client.send_goal_async(goal, feedback))
 
     def call(self, service: Any, request: Any) -> Any:
         return self.wait(service.call_async(request))

@@ -10,7 +10,6 @@ import pytest
 import yaml
 from action_msgs.msg import GoalStatus
 from control_msgs.action import GripperCommand
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 
 from kmn_perception.configuration import resources
@@ -18,6 +17,7 @@ from kmn_perception.configuration import resources
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import PATIENT, TrueDoorClient  # noqa: E402
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 ACTION = "l_gripper_controller/gripper_cmd"
@@ -28,7 +28,7 @@ class GripperClient(TrueDoorClient):
 
     def __init__(self, graph: Any) -> None:
         super().__init__(graph)
-        self.gripper = ActionClient(self, GripperCommand, ACTION)
+        self.gripper = LockedActionClient(self, GripperCommand, ACTION)
         self.gripper_feedback: list[GripperCommand.Feedback] = []
 
     def command(self, position: float, max_effort: float = 0.0) -> Any:

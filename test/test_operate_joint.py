@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 import yaml
 from action_msgs.msg import GoalStatus
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
@@ -21,6 +20,7 @@ from kmn_perception.configuration import resources
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import ALL, PATIENT, TrueDoorClient  # noqa: E402
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 
@@ -29,7 +29,7 @@ class DrawerClient(TrueDoorClient):
 
     def __init__(self, graph: Any) -> None:
         super().__init__(graph)
-        self.operate = ActionClient(
+        self.operate = LockedActionClient(
             self, OperateJoint, "operate_joint", feedback_sub_qos_profile=QoSProfile(depth=ALL)
         )
         self.told: list[OperateJoint.Feedback] = []

@@ -9,7 +9,6 @@ import pytest
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTolerance
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -20,6 +19,7 @@ from sim_client import SimClient, time_to_rest, trajectory
 pytest.importorskip("pybullet")
 from kmn_sim.robot.settings import RobotSettings  # noqa: E402
 from kmn_sim.ros.sim_node import SimNode  # noqa: E402
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 
 CONTROLLERS = RobotSettings.load().controllers
 ARM = list(CONTROLLERS["arm"].joints)
@@ -37,7 +37,7 @@ class ActionUser(SimClient):
     def __init__(self, graph: Any) -> None:
         super().__init__(graph)
         self.arm, self.gripper = (
-            ActionClient(
+            LockedActionClient(
                 self, FollowJointTrajectory, f"l_{part}_controller/follow_joint_trajectory"
             )
             for part in ("arm", "gripper")
@@ -45,7 +45,7 @@ class ActionUser(SimClient):
         self.feedback: list[FollowJointTrajectory.Feedback] = []
 
     def send(
-        self, message: JointTrajectory, client: ActionClient | None = None, **more: Any
+        self, message: JointTrajectory, client: LockedActionClient | None = None, **more: Any
     ) -> Any:
         """Send a goal; return its handle."""
         self.feedback.clear()

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
-from rclpy.action import ActionClient  # type: ignore[attr-defined]
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -30,6 +29,7 @@ pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import CAMERA_RATE, PATIENT, PULL, RELAYED, SPEED, DoorClient  # noqa: E402
 from kmn_skill.planning.robot import RobotModel  # noqa: E402
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 SLOW, STEADY = 1.0, 0.3  # simulated seconds in one second
@@ -191,7 +191,7 @@ def test_a_planner_that_was_killed_is_started_again(system: DoorClient) -> None:
 
 
 def test_a_hand_that_another_one_opens_grasps_again(system: DoorClient) -> None:
-    gripper = ActionClient(system, FollowJointTrajectory, PR2.controllers["gripper"].name)
+    gripper = LockedActionClient(system, FollowJointTrajectory, PR2.controllers["gripper"].name)
     assert gripper.wait_for_server(30.0)
     system.start_anew()
     handle = system.send()

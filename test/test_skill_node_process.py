@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 import yaml
-from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -20,6 +19,7 @@ from kmn_perception.configuration.section import ConfigurationError
 from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
+from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
 
 COMMAND = [sys.executable, "-m", "kmn_skill", "skill_node"]
@@ -59,7 +59,7 @@ def test_interrupted_it_ends_quietly_and_its_planner_with_it(
 
 def test_a_destroyed_node_offers_its_action_no_more(graph: Any) -> None:
     client = graph.start(lambda context: Node("client", context=context))
-    action = ActionClient(client, OpenDoor, "open_door")
+    action = LockedActionClient(client, OpenDoor, "open_door")
     with graph.running(SkillNode):
         assert action.wait_for_server(60.0)
     graph.wait_for(lambda: not action.server_is_ready())

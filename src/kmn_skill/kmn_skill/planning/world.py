@@ -122,9 +122,9 @@ class World:
             for body in model.bodies
         }
         if model.stem is not None:
-            joint = model.stem.joint
+            body = model.body(model.stem.joint.body)
             centre, size = model.stem.cuboid(gamma)
-            found[STEM] = Box(joint.name, centre - joint.origin(gamma), size)
+            found[STEM] = Box(object_body(body.name), centre - body.centre(gamma), size)
         found.update({o.name: Box(OBJECT, o.centre, o.size) for o in self._obstacles})
         return found
 
@@ -218,16 +218,12 @@ def _add_object(
         origin = joint.origin(gamma)
         where = f"{joint.name}_origin"
         add_frame(configuration, where, frames[parent], origin - origins[parent])
-        frame = configuration.addFrame(joint.name, where)
+        configuration.addFrame(joint.name, where)
         frames[joint.body], origins[joint.body] = joint.name, origin
-        if joint.name not in {each.name for each in moved}:
-            continue
-        if joint.type == REVOLUTE:
-            frame.setJoint(ry.JT.hinge, axis=joint.axis, limits=joint.limits)
-        else:
-            frames[joint.body] = _slide(configuration, joint)
+        if joint.name in {each.name for each in moved}:
+            frames[joint.body] = _free(configuration, joint)
     if setup.action.unlatch is None:
-        configuration.addFrame(NO_LATCH, OBJECT).setJoint(ry.JT.hinge, limits=[-1.0, 1.0])
+        configuration.addFrame(NO_LATCH, OBJECT).setJoint(ry.JT.hingeX, limits=[-1.0, 1.0])
     for body in model.bodies:
         carrier = frames.get(body.name, OBJECT)
         centre = body.centre(gamma) - origins.get(body.name, np.zeros(3))
@@ -236,10 +232,16 @@ def _add_object(
         )
 
 
-def _slide(configuration: Any, joint: Joint) -> str:
-    """Let the frame of a joint slide along its axis; return a frame with it that is not turned.
+def _free(configuration: Any, joint: Joint) -> str:
+    """Let the frame of a joint turn about its axis, or slide along it.
 
-    A joint of the package robotic slides along the x of its frame.
+    The package robotic knows no derivatives of a joint about an axis of its own (`JT.hinge`): it
+    takes them for 0. So the frame's x becomes the axis.
+
+    Returns
+    -------
+    frame
+        That moves with the joint, and is not turned where the joint is at 0.
     """
     ahead = np.array(joint.axis) / np.linalg.norm(joint.axis)
     aside = np.cross(ahead, np.roll(np.abs(ahead), 1))
@@ -249,7 +251,8 @@ def _slide(configuration: Any, joint: Joint) -> str:
     turn = np.column_stack([ahead, aside, np.cross(ahead, aside)])
     x, y, z, w = quaternion_from_matrix(turn)
     configuration.getFrame(f"{joint.name}_origin").setRelativeQuaternion([w, x, y, z])
-    configuration.getFrame(joint.name).setJoint(ry.JT.transX, limits=joint.limits)
+    kind = ry.JT.hingeX if joint.type == REVOLUTE else ry.JT.transX
+    configuration.getFrame(joint.name).setJoint(kind, limits=joint.limits)
     name = f"{joint.name}_moved"
     add_frame(configuration, name, joint.name, np.zeros(3), turn.T)
     return name

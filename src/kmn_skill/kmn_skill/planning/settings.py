@@ -51,12 +51,13 @@ class PlannerSettings(NamedTuple):
         Configurations in a phase of the first and of the final solution.
     release
         Configurations in which the hand lets go of the handle, and in which it draws back.
-    near
-        Pairs that are further apart in the first solution are left out in the final one, metres.
+    near_guess, near
+        Pairs that are further apart in the first guess are left out in the first solution, and
+        those further apart in that one in the final solution, metres.
     attempts, spread
         Number of first guesses, and the standard deviation (m and rad) by which they vary.
     noise
-        Standard deviation of what is added to what the solver starts from, m and rad.
+        Standard deviation of what is added to the first guess, m and rad.
     violation
         Of the constraints; above it the first solution is given up.
     attempt_limit, start_limit
@@ -66,6 +67,7 @@ class PlannerSettings(NamedTuple):
     coarse: Annotated[int, Field(ge=3, le=100)]
     fine: Annotated[int, Field(ge=3, le=1000)]
     release: Annotated[int, Field(ge=3, le=1000)]
+    near_guess: NonNegative
     near: NonNegative
     attempts: Annotated[int, Field(ge=1, le=100)]
     spread: NonNegative
@@ -137,8 +139,6 @@ class SkillSettings:
     ----------
     solver
         Options of the augmented Lagrangian, by their names.
-    coarse_solver
-        Those that differ for the first solution.
     surroundings
         The wall around a door, where there is one.
     """
@@ -146,7 +146,6 @@ class SkillSettings:
     policy: PolicySettings
     planner: PlannerSettings
     solver: dict[str, int | float]
-    coarse_solver: dict[str, int | float]
     timing: TimingSettings
     check: CheckSettings
     surroundings: SurroundingsSettings

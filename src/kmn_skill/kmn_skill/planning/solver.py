@@ -78,9 +78,18 @@ class Solver:
         return replace(plan, positions=plan.positions - turns, report=report)
 
     def coarse(
-        self, world: World, request: PlanRequest, guess: NDArray[np.float64]
+        self,
+        world: World,
+        request: PlanRequest,
+        guess: NDArray[np.float64],
+        near: float = np.inf,
     ) -> NDArray[np.float64]:
         """Return the solution (T, D) with few configurations, from a guess of as many.
+
+        Parameters
+        ----------
+        near
+            Pairs that are further apart in the guess are left out, metres.
 
         Raises
         ------
@@ -88,9 +97,9 @@ class Solver:
             If it is none.
         """
         settings = self._setup.settings
-        policy = Policy(world, request, settings.planner.coarse, pairs(world))
-        options = {**settings.solver, **settings.coarse_solver}
-        path, violation = optimise(policy.problem, self._disturbed(guess), options)
+        around = near_pairs(world, pairs(world), guess, near)
+        policy = Policy(world, request, settings.planner.coarse, around)
+        path, violation = optimise(policy.problem, self._disturbed(guess), settings.solver)
         if violation > settings.planner.violation:
             raise PlanRejected("no motion was found that fulfils all constraints")
         return path
@@ -99,11 +108,11 @@ class Solver:
         self, world: World, request: PlanRequest, guess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         settings = self._setup.settings
-        path = self.coarse(world, request, guess)
+        path = self.coarse(world, request, guess, settings.planner.near_guess)
         around = near_pairs(world, pairs(world), path, settings.planner.near)
         slices = settings.planner.fine
         policy = Policy(world, request, slices, around)
-        finer = refine(self._disturbed(path), request.configuration, slices)
+        finer = refine(path, request.configuration, slices)
         return optimise(policy.problem, finer, settings.solver)[0]
 
     def _standing(self, path: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
@@ -115,11 +124,10 @@ class Solver:
         return standing
 
     def _disturbed(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add some noise (m and rad) to a coarse path (T, D), the same each time.
+        """Add some noise (m and rad) to a guess (T, D), the same each time.
 
         On a guess that almost fulfils the constraints the solver ends at once, before it fulfils
-        them. The noise is interpolated with the coarse path, hence smooth: from a jagged fine path
-        the first steps are so large that they lead into obstacles.
+        them.
         """
         generator = np.random.default_rng(0)
         return path + generator.normal(0.0, self._setup.settings.planner.noise, path.shape)

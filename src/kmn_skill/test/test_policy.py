@@ -134,3 +134,18 @@ def test_the_spline_is_cubic() -> None:
     at = np.linspace(0.0, 2.0, 21, dtype=np.float64)
     found = hermite(nodes[:, None], velocities[:, None], times, at)[:, 0]
     assert found == pytest.approx(np.polyval(coefficients, at))
+
+
+@pytest.mark.parametrize("mode", DOOR_ANGLES)
+def test_the_derivatives_are_those_of_the_features(mode: str) -> None:
+    asked, path = request(mode), SOLUTIONS[mode][1:]
+    policy = Policy(World(SETUP, asked.theta, asked.gamma), asked, len(path) // 4, [])
+    problem = policy.problem.nlp()
+    at, step = path.reshape(-1) + 0.01, 1e-6
+    rows, columns, values = np.transpose(problem.evaluate(at)[1])
+    jacobian = np.zeros((len(problem.evaluate(at)[0]), len(at)))
+    np.add.at(jacobian, (rows.astype(int), columns.astype(int)), values)
+    for column in (*range(60, 130, 9), *range(12, len(at), 13), *range(11, len(at), 13)):
+        aside = step * np.eye(len(at))[column]
+        after, before = (problem.evaluate(at + way)[0] for way in (aside, -aside))
+        assert jacobian[:, column] == pytest.approx((after - before) / (2.0 * step), abs=1e-3)

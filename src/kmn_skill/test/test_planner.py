@@ -223,7 +223,7 @@ def test_stopped_processes_leave_no_folder_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with Planner(with_limits(attempt_limit=0.1), PROTOTYPES, time_limit=0.15) as planner:
+    with Planner(with_limits(attempt_limit=0.05), PROTOTYPES, time_limit=0.08) as planner:
         with pytest.raises(PlanningFailed):
             planner.plan(request())
         assert planner.restarts
@@ -234,7 +234,7 @@ def test_stopped_processes_leave_no_folder_behind(
 def test_a_process_that_dies_while_it_plans_is_replaced(planner: Planner) -> None:
     restarts, pid = planner.restarts, planner.pid
     assert pid is not None
-    timer = threading.Timer(0.3, os.kill, (pid, signal.SIGKILL))
+    timer = threading.Timer(0.05, os.kill, (pid, signal.SIGKILL))
     timer.start()
     found = planner.plan(request())
     timer.join()

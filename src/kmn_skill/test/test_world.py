@@ -114,5 +114,18 @@ def test_the_clearance_of_two_boxes_face_to_face_is_their_gap() -> None:
     apart[0, 3] = 0.33
     poses[0, 0, 3], poses[1] = 5.0, apart
     box = Box("box", np.zeros(3), np.full(3, 0.4))
-    others = np.broadcast_to(np.eye(4), (2, 4, 4))
-    assert clearance(Surface.of("part", corners), poses, box, others) == pytest.approx(0.03)
+    assert clearance(Surface.of("part", corners), poses, box) == pytest.approx(0.03)
+
+
+def test_the_clearance_is_that_of_the_nearest_of_all_points_at_all_times() -> None:
+    generator = np.random.default_rng(0)
+    box = Box("box", np.array([0.1, 0.0, -0.1]), np.array([0.4, 0.8, 1.2]))
+    points = generator.uniform(-0.1, 0.1, (50, 3))
+    for distance in (0.1, 0.5, 0.8, 1.2):
+        poses = np.broadcast_to(np.eye(4), (30, 4, 4)).copy()
+        poses[:, :3, :3] = np.linalg.qr(generator.normal(size=(30, 3, 3)))[0]
+        poses[:, :3, 3] = generator.uniform(-distance, distance, (30, 3))
+        moved = np.einsum("nij,pj->npi", poses[:, :3, :3], points) + poses[:, None, :3, 3]
+        nearest = float(box_distance(moved - box.centre, box.size).min())
+        found = clearance(Surface.of("part", points), poses, box, reach=0.3)
+        assert found == pytest.approx(min(nearest, 0.3))

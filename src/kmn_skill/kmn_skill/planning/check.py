@@ -208,6 +208,7 @@ def _clearance(
     around.update({name: own[name] for name in shape.obstacles})
     frames = sorted({box.frame for box in around.values()} | {p.frame for p in parts.values()})
     poses = dict(zip(frames, world.poses(path, frames).transpose(1, 0, 2, 3), strict=True))
+    inverse = {frame: np.linalg.inv(poses[frame]) for frame in {b.frame for b in around.values()}}
     smallest, names = REACH, ("", "")
     # Small bodies first: they come nearest, and leave less of the large ones to be measured.
     for body, part in sorted(parts.items(), key=lambda item: item[1].radius):
@@ -215,8 +216,8 @@ def _clearance(
             if other in shape.obstacles and body not in shape.moving:
                 continue
             free = unheld if body in shape.fingers and other in held else slice(None)
-            part_poses, box_poses = poses[part.frame][free], poses[box.frame][free]
-            distance = clearance(part, part_poses, box, box_poses, reach=smallest)
+            relative = inverse[box.frame][free] @ poses[part.frame][free]
+            distance = clearance(part, relative, box, reach=smallest)
             if distance < smallest:
                 smallest, names = distance, (body, other)
     return smallest, names

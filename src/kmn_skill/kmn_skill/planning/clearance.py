@@ -36,17 +36,16 @@ class Surface(NamedTuple):
 
 def clearance(
     surface: Surface,
-    surface_poses: NDArray[np.float64],
+    relative: NDArray[np.float64],
     box: Box,
-    box_poses: NDArray[np.float64],
     reach: float = REACH,
 ) -> float:
     """Return the smallest distance between a surface and a box; negative where they overlap.
 
     Parameters
     ----------
-    surface_poses, box_poses
-        (N, 4, 4) of their frames at N times.
+    relative
+        (N, 4, 4) poses of the surface's frame in the box's at N times.
     reach
         Up to which it is of interest, metres: what is further away is not measured.
 
@@ -55,9 +54,11 @@ def clearance(
     distance
         Metres; ``reach`` if it is larger.
     """
-    relative = np.linalg.inv(box_poses) @ surface_poses
     centres = relative[:, :3, :3] @ surface.centre + relative[:, :3, 3] - box.centre
-    near = relative[box_distance(centres, box.size) < surface.radius + reach]
+    away = box_distance(centres, box.size)
+    # Some point is nearer than the nearest sphere's far side: spheres beyond that do not matter.
+    within = min(reach, away.min(initial=reach) + surface.radius)
+    near = relative[away - surface.radius <= within]
     if not len(near):
         return reach
     points = surface.points @ near[:, :3, :3].transpose(0, 2, 1) + near[:, None, :3, 3]

@@ -16,9 +16,9 @@ TIERS = {
     "kmn_perception": (
         ("configuration",),
         ("command_line", "model"),
-        ("scene", "network", "refinement", "rooms", "transforms"),
-        ("estimate",),
-        ("estimator", "doors"),
+        ("scene", "network", "refinement", "transforms"),
+        ("estimate", "sharing"),
+        ("estimator", "doors", "rooms"),
         ("pipeline_interface", "model_choice"),
         ("pipeline", "door_pipeline"),
         ("training", "visualization"),

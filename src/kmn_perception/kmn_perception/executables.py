@@ -14,6 +14,7 @@ EXECUTABLES = {
     "evaluate_frames": ("kmn_perception.experiments.evaluate_frames", "evaluation"),
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "evaluate_fusion": ("kmn_perception.evaluation.doors.evaluate_fusion", ""),
+    "merge": ("kmn_perception.experiments.merge", "evaluation"),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "model_schema": ("kmn_perception.model.model_schema", ""),

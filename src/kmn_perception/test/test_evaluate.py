@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from kmn_perception.configuration import resources
 from kmn_perception.evaluation.comparison import Request
-from kmn_perception.evaluation.evaluate import evaluate, main
+from kmn_perception.evaluation.evaluate import experiment, main
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
@@ -141,10 +141,12 @@ def test_every_method_has_a_row_for_every_model(tmp_path: Path, name: str) -> No
 
 def test_slow_peers_are_measured_on_fewer_samples_unless_they_are_asked_for() -> None:
     few = dataclasses.replace(SETTINGS, peer_samples=2)
-    methods = evaluate(Request("box_a", seed=0, peers=True), 4, 1, few)["methods"]
+    methods = experiment(Request("box_a", seed=0, peers=True), 4, few).run(1)[1]["methods"]
     counts = {name: methods[name]["samples"] for name in ("kmn_paper", "icp", "information_limit")}
     assert counts == {"kmn_paper": 4, "icp": 2, "information_limit": 4}
-    methods = evaluate(Request("box_a", seed=0, methods=("small_gicp",)), 4, 1, few)["methods"]
+    methods = experiment(Request("box_a", seed=0, methods=("small_gicp",)), 4, few).run(1)[1][
+        "methods"
+    ]
     assert methods["small_gicp"]["samples"] == 4
 
 

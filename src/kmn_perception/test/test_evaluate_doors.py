@@ -60,7 +60,7 @@ def run(rooms: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         command = [str(rooms), "--json", str(out / "r.json"), "--out", str(out / "pictures")]
-        assert main(command) == 0
+        main(command)
     result = json.loads((out / "r.json").read_text())
     return Run(rooms, result, out / "pictures", printed.getvalue())
 
@@ -202,13 +202,11 @@ def test_a_label_without_a_key_is_refused_with_its_place(
         _frame(tmp_path, DOORS[0])
 
 
-def test_what_is_no_json_is_said(
-    rooms: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_json_is_said(rooms: Path, tmp_path: Path) -> None:
     _copy(rooms, tmp_path, "_d.png")
     (tmp_path / f"{DOORS[0]}.json").write_text("{")
-    assert main([str(tmp_path)]) == 1
-    assert f"evaluate_doors: {DOORS[0]}.json: not JSON" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match=rf"evaluate_doors: {DOORS[0]}\.json: not JSON"):
+        main([str(tmp_path)])
 
 
 @pytest.mark.parametrize(

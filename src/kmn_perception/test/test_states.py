@@ -122,7 +122,7 @@ def test_joints_that_actions_move_are_estimated_but_for_those_that_move_everythi
 
 
 def test_the_evaluation_of_states_tells_how_many_are_ok(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["--model", "drawer", "--samples", "2", "--states", "slide=-0.1"])
+    main(["--model", "drawer", "--samples", "2", "--states", "slide=-0.1", "--jobs", "1"])
     title, headings, row = capsys.readouterr().out.splitlines()
     assert title.startswith("drawer: 2 samples of each state")
     assert headings.split()[0] == "joint"

@@ -88,7 +88,7 @@ def files(settings: WallTrainingSettings, tmp_path_factory: pytest.TempPathFacto
 def test_rooms_give_views_with_and_without_doors(
     files: list[Path], settings: WallTrainingSettings
 ) -> None:
-    samples, held_out = read_shards(files, settings)
+    samples, held_out = read_shards(files, settings, DOORS)
     for sample in samples + held_out:
         assert sample.cells.shape[:2] == (CHANNELS, ROWS)
         assert sample.cells.shape[2] * CELL[1] > settings.data.min_length - CELL[1]
@@ -118,7 +118,9 @@ def fitting(
     use_one_thread()
     torch.manual_seed(settings.seed)
     network = WallNetwork(settings.width)
-    return Fitting(network, *read_shards(files, settings), settings, CELL, kind(folder, {}, 60.0))
+    return Fitting(
+        network, *read_shards(files, settings, DOORS), settings, CELL, kind(folder, {}, 60.0)
+    )
 
 
 def test_a_few_steps_lower_the_loss_and_an_interruption_changes_nothing(
@@ -171,13 +173,13 @@ def test_a_damaged_file_of_rooms_is_named(
     damaged = tmp_path / "rooms.npz"
     damaged.write_bytes(files[0].read_bytes()[:-1000])
     with pytest.raises(RunError, match=f"{damaged} is damaged .*remove it to render its rooms"):
-        read_shards([damaged], settings)
+        read_shards([damaged], settings, DOORS)
 
 
 def test_too_few_rooms_are_refused(files: list[Path], settings: WallTrainingSettings) -> None:
     none = replace(settings, data=settings.data._replace(validation=0.001))
     with pytest.raises(RunError, match="and 0 to measure by; ask for more with --rooms"):
-        read_shards(files, none)
+        read_shards(files, none, DOORS)
 
 
 def test_the_command_line_takes_the_place_of_settings() -> None:

@@ -133,13 +133,13 @@ def test_wrong_settings_are_refused(tmp_path: Path, line: str, message: str) -> 
         load_training_settings(file)
 
 
-def test_more_processes_make_the_same_data(tmp_path: Path) -> None:
+def test_more_jobs_make_the_same_data(tmp_path: Path) -> None:
     """Compared are the weights, which no other data would give."""
     one, three = tmp_path / "one.safetensors", tmp_path / "three.safetensors"
     few = ["--samples", "60", "--epochs", "1"]
     for settings in ("paper/box_a", "box_a"):
         assert run(one, "--config", settings, "--restart", *few).returncode == 0
-        more = run(three, "--config", settings, "--restart", *few, "--processes", "3")
+        more = run(three, "--config", settings, "--restart", *few, "--jobs", "3")
         assert more.returncode == 0, more.stderr
         for name, tensor in load_file(str(one)).items():
             np.testing.assert_array_equal(tensor.numpy(), load_file(str(three))[name].numpy())

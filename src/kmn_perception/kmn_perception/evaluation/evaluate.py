@@ -7,54 +7,39 @@ import math
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
-from tqdm import tqdm
-
-from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.hashes import short_hash
 from kmn_perception.configuration.section import ConfigurationError
-from kmn_perception.evaluation.comparison import NAMES, Comparison, Request
+from kmn_perception.evaluation.comparison import NAMES, Comparison, Measurement, Request
 from kmn_perception.evaluation.doors.room_comparison import (
     ROOM_METHODS,
     ROOM_NOISES,
     RoomComparison,
+    RoomSample,
 )
 from kmn_perception.evaluation.doors.room_statistics import statistics
 from kmn_perception.evaluation.doors.room_tables import room_report
-from kmn_perception.evaluation.hashes import short_hash
 from kmn_perception.evaluation.methods import MethodError
-from kmn_perception.evaluation.moved import evaluate_moved, moved_report, state
+from kmn_perception.evaluation.moved import moved_experiment, state
 from kmn_perception.evaluation.settings import EvaluationSettings
 from kmn_perception.evaluation.table import report
 from kmn_perception.evaluation.tally import Tally
 from kmn_perception.model.room_model import has_surroundings
 from kmn_perception.model.sensor_noise import NOISES
-from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.weights import WeightsError
-from kmn_perception.training.processes import in_order
+from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
 
 WORTHWHILE = 50  # samples of a process; for fewer its start, some seconds, does not pay
 
-Measured = TypeVar("Measured", covariant=True)
 
-
-class Compares(Protocol[Measured]):
-    """What compares methods on one sample after the other."""
-
-    noise: str
-    left_out: dict[str, str]
-
-    def __call__(self, index: int) -> Measured:
-        """Return what is measured on a sample."""
-        ...
-
-
-def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
-    """Parse the command line."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of what is to be evaluated."""
     parser = argparse.ArgumentParser(prog="evaluate", description=__doc__)
     parser.add_argument("--model", required=True, help="name or YAML file of the kinematic model")
     parser.add_argument("--samples", type=whole_number(1), default=2000, help="default 2000")
@@ -84,36 +69,46 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
         metavar="JOINT=POSITION",
         help="see the object with a joint moved, and tell what the estimates of that are worth",
     )
-    parser.add_argument("--json", type=output_file, help="file to write the result to")
-    parser.add_argument(
-        "--jobs", type=whole_number(1), default=os.cpu_count() or 1, help="processes (default: all)"
-    )
-    return parser.parse_args(argv)
+    return parser
 
 
-def evaluate(
-    request: Request, samples: int, jobs: int, settings: EvaluationSettings
-) -> dict[str, Any]:
-    """Return the statistics of all methods on samples of their own, as written to JSON."""
+def experiment(
+    request: Request, samples: int, settings: EvaluationSettings
+) -> SharedExperiment[tuple[float, dict[str, Measurement]]]:
+    """Return what compares all methods on samples of a model."""
     comparison = Comparison(request, settings)
-    tallies = {
-        name: Tally(comparison.model, counted, settings)
-        for name, counted in comparison.counted.items()
-    }
-    make = partial(Comparison, request, settings)
-    for visible, measured in _measured(comparison, make, comparison.model.name, samples, jobs):
-        for method, measurement in measured.items():
-            tallies[method].add(visible, measurement)
-    return {
-        **_heading(request, samples, comparison.model.name, comparison.noise),
-        "weights": comparison.networks.hashes,
-        "configuration": configuration_hash(request.model),
-        "methods": {method: tally.summary() for method, tally in tallies.items()},
-    }
+    model = comparison.model
+    _tell(comparison.left_out)
+
+    def conclude(found: list[tuple[float, dict[str, Measurement]]]) -> tuple[str, Any]:
+        tallies = {
+            name: Tally(model, counted, settings) for name, counted in comparison.counted.items()
+        }
+        for visible, measured in found:
+            for method, measurement in measured.items():
+                tallies[method].add(visible, measurement)
+        result = {
+            **_heading(request, samples, model.name, comparison.noise),
+            "weights": comparison.networks.hashes,
+            "configuration": configuration_hash(request.model),
+            "methods": {method: tally.summary() for method, tally in tallies.items()},
+        }
+        return report(result, settings.paper.get(model.name, {})), result
+
+    return SharedExperiment(
+        title=f"evaluate {model.name} ({comparison.noise})",
+        unit="samples",
+        items=samples,
+        kind=tuple[float, dict[str, Measurement]],
+        make=partial(Comparison, request, settings),
+        conclude=conclude,
+        worthwhile=WORTHWHILE,
+        depends_on=comparison.networks.hashes,
+    )
 
 
-def evaluate_rooms(request: Request, samples: int, jobs: int) -> dict[str, Any]:
-    """Return the statistics of all methods on rendered rooms, as written to JSON.
+def room_experiment(request: Request, samples: int) -> SharedExperiment[RoomSample]:
+    """Return what compares all methods on rendered rooms.
 
     Parameters
     ----------
@@ -122,37 +117,32 @@ def evaluate_rooms(request: Request, samples: int, jobs: int) -> dict[str, Any]:
     """
     comparison = RoomComparison(request, samples)
     name, settings = comparison.model.model.name, comparison.settings
-    rooms = samples + math.ceil(settings.negatives * samples)
-    make = partial(RoomComparison, request, samples)
-    measured = list(_measured(comparison, make, name, rooms, jobs))
-    return {
-        **_heading(request, samples, name, comparison.noise),
-        "weights": comparison.hashes,
-        "configuration": configuration_hash(request.model),
-        **statistics(measured, comparison.methods, settings),
-    }
+    _tell(comparison.left_out)
+
+    def conclude(found: list[RoomSample]) -> tuple[str, Any]:
+        result = {
+            **_heading(request, samples, name, comparison.noise),
+            "weights": comparison.hashes,
+            "configuration": configuration_hash(request.model),
+            **statistics(found, comparison.methods, settings),
+        }
+        return room_report(result), result
+
+    return SharedExperiment(
+        title=f"evaluate {name} ({comparison.noise})",
+        unit="rooms",
+        items=samples + math.ceil(settings.negatives * samples),
+        kind=RoomSample,
+        make=partial(RoomComparison, request, samples),
+        conclude=conclude,
+        worthwhile=WORTHWHILE,
+        depends_on=comparison.hashes,
+    )
 
 
-def _measured(
-    comparison: Compares[Measured],
-    make: Callable[[], Compares[Measured]],
-    name: str,
-    samples: int,
-    jobs: int,
-) -> Iterator[Measured]:
-    """Yield what is measured on each sample, and show how far it is."""
-    for method, reason in comparison.left_out.items():
+def _tell(left_out: Mapping[str, str]) -> None:
+    for method, reason in left_out.items():
         print(f"{method} is left out: {reason}", file=sys.stderr)
-    with tqdm(
-        total=samples,
-        desc=f"evaluate {name} ({comparison.noise})",
-        unit=" samples",
-        mininterval=1.0,
-    ) as bar:
-        use_one_thread()
-        for measured in in_order(make, range(samples), jobs, WORTHWHILE):
-            yield measured
-            bar.update()
 
 
 def _heading(request: Request, samples: int, name: str, noise: str) -> dict[str, Any]:
@@ -193,32 +183,34 @@ def configuration_hash(model: str) -> str:
     )
 
 
+def prepare(options: argparse.Namespace) -> SharedExperiment[Any]:
+    """Return the experiment that the options tell."""
+    request = Request(
+        model=options.model,
+        seed=options.seed,
+        noise=options.noise,
+        methods=options.methods and tuple(options.methods),
+        peers=options.peers,
+        weights=options.weights,
+        paper_weights=options.paper_weights,
+    )
+    if options.states:
+        return moved_experiment(request, options.states, options.samples)
+    if has_surroundings(options.model):
+        return room_experiment(request, options.samples)
+    return experiment(request, options.samples, EvaluationSettings.load())
+
+
+COMMAND = ExperimentCommand(
+    package="kmn_perception",
+    name="evaluate",
+    parser=parser,
+    prepare=prepare,
+    expected=(ConfigurationError, MethodError, WeightsError),
+    jobs=os.cpu_count() or 1,
+)
+
+
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the executable."""
-    options = arguments(argv)
-    try:
-        settings = EvaluationSettings.load()
-        request = Request(
-            model=options.model,
-            seed=options.seed,
-            noise=options.noise,
-            methods=options.methods and tuple(options.methods),
-            peers=options.peers,
-            weights=options.weights,
-            paper_weights=options.paper_weights,
-        )
-        if options.states:
-            result = evaluate_moved(request, options.states, options.samples)
-            print(moved_report(result))
-        elif has_surroundings(options.model):
-            result = evaluate_rooms(request, options.samples, options.jobs)
-            print(room_report(result))
-        else:
-            result = evaluate(request, options.samples, options.jobs, settings)
-            print(report(result, settings.paper.get(result["model"], {})))
-        if options.json:
-            write_json(options.json, result)
-    except KeyboardInterrupt:
-        sys.exit("evaluate: interrupted")
-    except (ConfigurationError, MethodError, OSError, WeightsError) as error:
-        sys.exit(f"evaluate: {error}")
+    COMMAND.start(argv)

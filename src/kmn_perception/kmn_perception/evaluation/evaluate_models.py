@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import NONE, columns
+from kmn_perception.configuration import resources
+from kmn_perception.configuration.hashes import short_hash
 from kmn_perception.configuration.node_parameters import parameter_values, pick
 from kmn_perception.estimate import Status
 from kmn_perception.estimator import EstimatorSettings, MorphEstimator
 from kmn_perception.evaluation.things import ThingSettings, draw_thing, kinds_of
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
 from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.sensor_noise import NOISES, add_noise
 from kmn_perception.model_choice import ModelChoice
-from kmn_perception.network.threads import use_one_thread
-from kmn_perception.training.processes import in_order
+from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
 from kmn_perception.training.samples import EVALUATION, sample
 
 WORTHWHILE = 20  # samples of a process; for fewer its start, some seconds, does not pay
@@ -121,8 +121,8 @@ def _verdicts(told: Sequence[Told]) -> Iterator[str]:
     yield f"things of no model that are OK: {wrong} of {len(things)}"
 
 
-def arguments(command: Sequence[str] | None = None) -> argparse.Namespace:
-    """Parse the command line."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of what is to be evaluated."""
     parser = argparse.ArgumentParser(prog="evaluate_models", description=__doc__)
     parser.add_argument("--models", required=True, help="names or YAML files, separated by commas")
     parser.add_argument(
@@ -131,26 +131,45 @@ def arguments(command: Sequence[str] | None = None) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of samples (default 0)")
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
-    parser.add_argument(
-        "--jobs", type=whole_number(1), default=os.cpu_count() or 1, help="processes (default: all)"
-    )
-    return parser.parse_args(command)
+    return parser
 
 
-def main(command: Sequence[str] | None = None) -> int:
-    """Run the executable ``evaluate_models``."""
-    options = arguments(command)
+def prepare(options: argparse.Namespace) -> SharedExperiment[Told]:
+    """Return the experiment that the options tell."""
     models = [name.strip() for name in options.models.split(",")]
-    try:
-        make = partial(ModelMeasurement, models, options.seed, options.noise, options.samples)
-        measure = make()
-        count = 2 * options.samples
-        use_one_thread()
-        found = in_order(make, range(count), options.jobs, WORTHWHILE)
-        told = list(tqdm(found, desc="evaluate_models", unit=" samples", total=count))
-        print(table(told, [model.name for model in measure.choice.models]))
-    except KeyboardInterrupt:
-        sys.exit("evaluate_models: interrupted")
-    except (OSError, ValueError) as error:
-        sys.exit(f"evaluate_models: {error}")
-    return 0
+    names = [KinematicModel.load(model).name for model in models]
+    files = [resources.find("config/models", model) for model in models]
+
+    def conclude(told: list[Told]) -> tuple[str, Any]:
+        counts = Counter((each.seen, each.model, each.status.name) for each in told)
+        keys = ("seen", "best", "status", "number")
+        return table(told, names), {
+            **{name: getattr(options, name) for name in ("models", "samples", "seed", "noise")},
+            "told": [dict(zip(keys, (*of, n), strict=True)) for of, n in sorted(counts.items())],
+        }
+
+    return SharedExperiment(
+        title="evaluate_models",
+        unit="samples",
+        items=2 * options.samples,
+        kind=Told,
+        make=partial(ModelMeasurement, models, options.seed, options.noise, options.samples),
+        conclude=conclude,
+        worthwhile=WORTHWHILE,
+        depends_on={"model files": short_hash(*files)},
+    )
+
+
+COMMAND = ExperimentCommand(
+    package="kmn_perception",
+    name="evaluate_models",
+    parser=parser,
+    prepare=prepare,
+    expected=(ValueError,),
+    jobs=os.cpu_count() or 1,
+)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the executable ``evaluate_models``."""
+    COMMAND.start(argv)

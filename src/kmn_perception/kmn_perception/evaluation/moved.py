@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+from functools import partial
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -20,11 +21,12 @@ from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.sensor_noise import NOISES
 from kmn_perception.network.errors import absolute_errors
-from kmn_perception.network.threads import use_one_thread
+from kmn_perception.sharing.experiment import SharedExperiment
 from kmn_perception.training.samples import EVALUATION, observe
 
 HEADINGS = ("joint", "OK", "in 95 %", "off, median", "most", "stated", "others, most", "ms")
 THOUSAND = 1e3
+WORTHWHILE = 20  # samples of a process; for fewer its start, some seconds, does not pay
 
 
 class State(NamedTuple):
@@ -70,10 +72,29 @@ def state(argument: str) -> State:
         ) from None
 
 
-def evaluate_moved(request: Request, states: Sequence[State], samples: int) -> dict[str, Any]:
-    """Return what the estimates of objects with a moved joint are worth, as written to JSON.
+class MovedMeasurement:
+    """Estimates objects one of whose joints has moved, as morph_node does by default.
 
-    The estimator is that of morph_node with its default parameters.
+    Samples are numbered through all states.
+    """
+
+    def __init__(self, request: Request, noise: str, states: Sequence[State], samples: int) -> None:
+        settings = pick(EstimatorSettings, parameter_values("morph_node"))
+        self._estimator = MorphEstimator.load(request.model, request.weights or "", settings)
+        self._estimator.warm_up()
+        self._seed, self._noise = request.seed, noise
+        self._states, self._samples = states, samples
+
+    def __call__(self, index: int) -> Outcome:
+        """Return what the estimate of a sample is worth."""
+        number, sample = divmod(index, self._samples)
+        return _outcome(self._estimator, self._states[number], self._noise, self._seed, sample)
+
+
+def moved_experiment(
+    request: Request, states: Sequence[State], samples: int
+) -> SharedExperiment[Outcome]:
+    """Return what tells the worth of estimates of objects with a moved joint.
 
     Raises
     ------
@@ -92,28 +113,34 @@ def evaluate_moved(request: Request, states: Sequence[State], samples: int) -> d
     noise = request.noise or "none"
     if noise not in NOISES:
         raise MethodError(f"noise must be {', '.join(NOISES)}, found '{noise}'")
-    use_one_thread()
-    settings = pick(EstimatorSettings, parameter_values("morph_node"))
-    estimator = MorphEstimator.load(request.model, request.weights or "", settings)
-    estimator.warm_up()
-    found = {
-        f"{moved.joint} = {moved.position:g}": [
-            _outcome(estimator, moved, noise, request.seed, index)._asdict()
-            for index in range(samples)
-        ]
-        for moved in states
-    }
-    return {
-        "model": model.name,
-        "samples": samples,
-        "seed": request.seed,
-        "noise": noise,
-        "states": found,
-    }
+
+    def conclude(found: list[Outcome]) -> tuple[str, Any]:
+        outcomes = [outcome._asdict() for outcome in found]
+        result = {
+            "model": model.name,
+            "samples": samples,
+            "seed": request.seed,
+            "noise": noise,
+            "states": {
+                f"{moved.joint} = {moved.position:g}": outcomes[i * samples : (i + 1) * samples]
+                for i, moved in enumerate(states)
+            },
+        }
+        return moved_report(result), result
+
+    return SharedExperiment(
+        title=f"evaluate {model.name} ({noise})",
+        unit="samples",
+        items=len(states) * samples,
+        kind=Outcome,
+        make=partial(MovedMeasurement, request, noise, states, samples),
+        conclude=conclude,
+        worthwhile=WORTHWHILE,
+    )
 
 
 def moved_report(result: dict[str, Any]) -> str:
-    """Return the table of `evaluate_moved`: errors are those of estimates that are OK."""
+    """Return the table of `moved_experiment`: errors are those of estimates that are OK."""
     rows: list[Sequence[str]] = [HEADINGS]
     for name, outcomes in result["states"].items():
         ok = [outcome for outcome in outcomes if outcome["ok"]]

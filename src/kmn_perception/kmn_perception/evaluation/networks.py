@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kmn_perception.configuration import resources
-from kmn_perception.evaluation.hashes import short_hash
+from kmn_perception.configuration.hashes import short_hash
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
 from kmn_perception.network.weights import Weights, WeightsError

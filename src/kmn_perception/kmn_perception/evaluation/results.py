@@ -17,7 +17,7 @@ from kmn_perception.command_line.arguments import output_folder, whole_number, w
 from kmn_perception.configuration.output import replacing
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.comparison import LIMIT, Comparison, Request
-from kmn_perception.evaluation.evaluate import command, configuration_hash, evaluate
+from kmn_perception.evaluation.evaluate import command, configuration_hash, experiment
 from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.evaluation.networks import load_networks
 from kmn_perception.evaluation.page import (
@@ -73,7 +73,7 @@ def result_of(
         if {key: earlier.get(key) for key in expected} == expected:
             print(f"{file}: taken over, nothing has changed", file=sys.stderr)
             return earlier
-    result = evaluate(request, samples, jobs, settings)
+    _, result = experiment(request, samples, settings).run(jobs)
     write_json(file, result)
     return result
 

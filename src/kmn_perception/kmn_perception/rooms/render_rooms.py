@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +15,16 @@ import numpy as np
 from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_folder, whole_number, write_json
-from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.rooms.frame import CALIBRATIONS, Frame, make_frame
 from kmn_perception.rooms.label import label
 from kmn_perception.rooms.sampling import KINDS
+from kmn_perception.sharing.experiment import add_jobs, add_shard
+from kmn_perception.sharing.processes import in_order
 
 QUALITY = 95  # of the JPEG
+HOW = ("sensor", "calibration", "kind")  # a room is rendered, beside its seed
+WORTHWHILE = 20  # rooms of a process; for fewer its start, some seconds, does not pay
 
 
 def write(folder: Path, name: str, frame: Frame, source: dict[str, Any]) -> None:
@@ -48,19 +53,57 @@ def arguments(command: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--kind", choices=KINDS, default="door", help="what is in the wall (default door)"
     )
+    add_jobs(parser)
+    add_shard(parser)
     return parser.parse_args(command)
 
 
+def missing(options: argparse.Namespace) -> list[int]:
+    """Return the seeds of the shard's rooms that are not rendered yet.
+
+    Raises
+    ------
+    ValueError
+        If a room of another rendering has the name of one of them.
+    """
+    seeds = []
+    for i in options.shard.items(options.count):
+        seed = options.seed + i
+        file = options.out / f"{options.kind}_{seed}.json"  # is written last
+        if not file.is_file():
+            seeds.append(seed)
+        elif not _source(options, seed).items() <= json.loads(file.read_text())["source"].items():
+            raise ValueError(f"{file} is of a room rendered with other options; use another --out")
+    return seeds
+
+
+def _source(options: argparse.Namespace, seed: int) -> dict[str, Any]:
+    return {"seed": seed, **{key: getattr(options, key) for key in HOW}}
+
+
+class Rendering:
+    """Renders rooms, and writes them to a folder."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._options = options
+
+    def __call__(self, seed: int) -> None:
+        """Render the room of a seed."""
+        source = _source(self._options, seed)
+        frame = make_frame(**source)
+        write(self._options.out, f"{self._options.kind}_{seed}", frame, source)
+
+
 def main(command: Sequence[str] | None = None) -> int:
-    """Run the executable ``render_rooms``."""
+    """Run the executable ``render_rooms``; rooms that are there are not rendered again."""
     options = arguments(command)
-    source = {key: getattr(options, key) for key in ("sensor", "calibration", "kind")}
     try:
         options.out.mkdir(parents=True, exist_ok=True)
-        for seed in tqdm(range(options.seed, options.seed + options.count), unit="room"):
-            frame = make_frame(seed, **source)
-            write(options.out, f"{options.kind}_{seed}", frame, {"seed": seed, **source})
-    except (ConfigurationError, OSError) as error:
+        seeds = missing(options)
+        done = in_order(partial(Rendering, options), seeds, options.jobs, WORTHWHILE)
+        for _ in tqdm(done, total=len(seeds), unit="room"):
+            pass
+    except (ValueError, OSError) as error:
         print(f"render_rooms: {error}", file=sys.stderr)
         return 1
     return 0

@@ -18,8 +18,8 @@ from torch.nn.functional import mse_loss
 from kmn_perception.network.encoding import ParameterEncoding
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import Inputs, MorphNetwork
+from kmn_perception.sharing.processes import in_order
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.processes import in_order
 from kmn_perception.training.samples import TrainingSamples
 from kmn_perception.training.settings import Algorithm2Settings
 from kmn_perception.training.training import Training
@@ -58,7 +58,7 @@ class Algorithm2(Training):
         first = target - (self.augmented if steps else self.samples)
         make = partial(PredictedSample, self.cpu_network(), self.source, steps)
         missing = range(self.state.filled - first, target - first)
-        made = in_order(make, missing, self.processes)
+        made = in_order(make, missing, self.jobs)
         with self.bar("data", target - first, missing.start) as bar, closing(made):
             for images, left in made:
                 row = self.state.filled

@@ -18,8 +18,8 @@ from kmn_perception.network.cascade import Cascade
 from kmn_perception.network.morph import predictions
 from kmn_perception.network.morph_network import Inputs, MorphNetwork
 from kmn_perception.network.stage import Stage
+from kmn_perception.sharing.processes import in_order
 from kmn_perception.training.dataset import Dataset
-from kmn_perception.training.processes import in_order
 from kmn_perception.training.samples import TrainingSamples
 from kmn_perception.training.settings import StagewiseSettings
 from kmn_perception.training.training import Training
@@ -71,7 +71,7 @@ class StagewiseTraining(Training):
             self.samples, self.copies, self.stagewise.spread,
         )  # fmt: skip
         missing = range(self.state.filled // self.copies, self.samples, CHUNK)
-        made = in_order(make, missing, self.processes)
+        made = in_order(make, missing, self.jobs)
         with self.bar("data", target, self.state.filled) as bar, closing(made):
             for chunk in made:
                 for inputs, left in chunk:

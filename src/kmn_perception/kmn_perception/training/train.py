@@ -17,6 +17,7 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.network import weights
 from kmn_perception.network.designs import DESIGNS
 from kmn_perception.network.morph_network import MorphNetwork
+from kmn_perception.sharing.experiment import add_jobs
 from kmn_perception.training.procedures import load_training_settings, procedure_of
 from kmn_perception.training.run import Run, run_to_end
 from kmn_perception.training.settings import SharedSettings, TrainingSettings
@@ -49,7 +50,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--restart", action="store_true", help="discard an earlier run")
     parser.add_argument("--device", default="auto", choices=("auto", "cpu", "cuda"))
     parser.add_argument("--threads", type=positive, default=1, help="threads of torch")
-    parser.add_argument("--processes", type=positive, default=1, help="that generate data")
+    add_jobs(parser)
     return parser.parse_args(argv)
 
 
@@ -88,7 +89,7 @@ def train(options: argparse.Namespace) -> None:
         for interruption in (signal.SIGINT, signal.SIGTERM):
             signal.signal(interruption, run.interrupt)
         training = procedure_of(settings.network)(
-            network, settings, shared.validation, run, workers, options.processes
+            network, settings, shared.validation, run, workers, options.jobs
         )
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"

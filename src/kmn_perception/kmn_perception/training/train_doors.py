@@ -6,7 +6,6 @@ import argparse
 import dataclasses
 import shutil
 import signal
-from typing import Any
 
 import torch
 
@@ -16,12 +15,14 @@ from kmn_perception.doors.view_cells import describe_cells
 from kmn_perception.network import wall_weights
 from kmn_perception.network.threads import use_one_thread
 from kmn_perception.network.wall_network import WallNetwork
-from kmn_perception.rooms.settings import RoomSettings
+from kmn_perception.sharing.experiment import add_jobs, add_shard
+from kmn_perception.sharing.plain import to_plain
+from kmn_perception.sharing.records import WHOLE
 from kmn_perception.training.run import Run, run_to_end
 from kmn_perception.training.settings import SharedSettings
 from kmn_perception.training.wall.fitting import Fitting
 from kmn_perception.training.wall.settings import WallTrainingSettings
-from kmn_perception.training.wall.shards import make_shards, read_shards
+from kmn_perception.training.wall.shards import data_depend_on, make_shards, read_shards
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
@@ -37,11 +38,12 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--rooms", type=whole_number(2), help="in place of the settings'")
     parser.add_argument("--epochs", type=positive, help="in place of the settings'")
     parser.add_argument("--seed", type=whole_number(0), help="in place of the settings'")
-    parser.add_argument("--processes", type=positive, default=1, help="that render (default 1)")
     parser.add_argument(
         "--run", type=output_folder, help="folder of the run (default: beside --out)"
     )
     parser.add_argument("--restart", action="store_true", help="discard an earlier run")
+    add_jobs(parser)
+    add_shard(parser)
     return parser.parse_args(argv)
 
 
@@ -58,21 +60,23 @@ def settings_of(options: argparse.Namespace) -> WallTrainingSettings:
 
 
 def train(options: argparse.Namespace) -> None:
-    """Train as the options say, and write the weight file."""
+    """Train as the options say, and write the weight file; of a shard, render the data only."""
     settings, doors = settings_of(options), DoorSettings.load()
     folder = options.run or options.out.with_suffix(".run")
     if options.restart and folder.exists():
         shutil.rmtree(folder)
     cells = describe_cells(doors)
-    known = {"training": _plain(settings), "cells": cells}
+    known = {"training": to_plain(settings), "cells": cells}
     seconds = SharedSettings.load().checkpoint_seconds
-    run = Run(folder, {**known, "depends_on": _data_depend_on(doors)}, seconds)
+    run = Run(folder, {**known, "depends_on": data_depend_on(doors)}, seconds)
     for interruption in (signal.SIGINT, signal.SIGTERM):
         signal.signal(interruption, run.interrupt)
-    files = make_shards(
-        folder / "data", settings, doors, options.processes, lambda: run.interrupted
-    )
-    samples, held_out = read_shards(files, settings)
+    data = folder / "data"
+    files = make_shards(data, settings, doors, options.jobs, lambda: run.interrupted, options.shard)
+    if options.shard != WHOLE:
+        print(f"{data} holds shard {options.shard}: {len(files)} files; training needs all of them")
+        return
+    samples, held_out = read_shards(files, settings, doors)
     print(f"{len(samples)} views to train on, {len(held_out)} held out; the run: {folder}")
     use_one_thread()
     torch.manual_seed(settings.seed)
@@ -90,27 +94,6 @@ def train(options: argparse.Namespace) -> None:
     }
     wall_weights.save(options.out, wall_weights.WallWeights(network, cells, metadata))
     print(f"wrote {options.out}")
-
-
-def _data_depend_on(doors: DoorSettings) -> dict[str, Any]:
-    """Return the settings of others on which the samples depend: a run goes on with the same."""
-    parts = {
-        name: getattr(doors, name) for name in ("planes", "vertical", "floor", "view", "prior")
-    }
-    return {"doors": {name: _plain(part) for name, part in parts.items()},
-            "rooms": _plain(RoomSettings.load())}  # fmt: skip
-
-
-def _plain(settings: Any) -> Any:
-    """Return settings as dictionaries, lists and values."""
-    if dataclasses.is_dataclass(settings):
-        fields = dataclasses.fields(settings)
-        return {field.name: _plain(getattr(settings, field.name)) for field in fields}
-    if hasattr(settings, "_asdict"):
-        return {name: _plain(value) for name, value in settings._asdict().items()}
-    if isinstance(settings, dict):
-        return {name: _plain(value) for name, value in settings.items()}
-    return list(settings) if isinstance(settings, tuple) else settings
 
 
 def main() -> None:

@@ -50,7 +50,7 @@ class Training(ABC):
         Keeps checkpoints and curves.
     workers
         The processes that train together; each generates and keeps its own share of the data.
-    processes
+    jobs
         How many generate the data of each of them.
     """
 
@@ -65,11 +65,11 @@ class Training(ABC):
         validation: ValidationSettings,
         run: Run,
         workers: Workers,
-        processes: int = 1,
+        jobs: int = 1,
     ) -> None:
         self.network, self.model = network.to(workers.device), network.model
         self.settings, self.validation, self.run, self.workers = settings, validation, run, workers
-        self.processes, self.state = processes, TrainingState()
+        self.jobs, self.state = jobs, TrainingState()
         self.samples = math.ceil(settings.samples / workers.count)  # N_data of this worker
         self.source = TrainingSamples(
             self.model, settings.seed, settings.sensor, workers.rank, workers.count

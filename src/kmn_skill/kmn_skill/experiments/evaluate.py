@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from kmn_perception.command_line.arguments import output_file, whole_number, write_json
-from kmn_perception.model.actions import Action
+from kmn_perception.command_line.arguments import output_file, whole_number
+from kmn_perception.configuration.hashes import short_hash
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.noisy_sensor import SENSORS
-from kmn_perception.ros.program import own_arguments, ros_session
+from kmn_perception.ros.program import EXPECTED, own_arguments, ros_session
+from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
 from kmn_skill.experiments.door_system import ON_ROBOT, SOURCES, DoorSystem, Room
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.settings import (
@@ -52,62 +56,71 @@ def random_rooms(options: argparse.Namespace, count: int) -> list[Room] | list[N
     return [Room(options.seed + number, recess) for number, recess in enumerate(recesses)]
 
 
-def run(options: argparse.Namespace, experiment: Experiment) -> list[Trial]:
-    """Open all doors, one after the other."""
-    model = experiment.kinematic_model(options.object, options.room)
-    options.mode = chosen_mode(model.actions[0], options.mode)
-    doors = experiment.random_objects(model, options.room, options.doors, options.seed)
-    rooms = random_rooms(options, options.doors)
-    pace = experiment.real_time if options.real_time else experiment.evaluation
-    sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed}
-    sim["camera_mount"] = CAMERAS[options.camera]
-    if options.faults:
-        sim |= experiment.faults
-    trials: list[Trial] = []
-    with (
-        DoorSystem(sim, options, experiment) as system,
-        tqdm(doors, unit="door") as bar,
-    ):
-        for values, room in zip(bar, rooms, strict=True):
-            strip = options.strip if not trials else None
-            system.show(values, options.mode, room)
-            trials.append(
-                _open(system, values, (model.actions[0], options.mode), experiment, strip)
-            )
-            bar.set_postfix_str(f"{sum(trial.opened for trial in trials)} open")
-    return trials
+class DoorTrials:
+    """Opens one door after the other; to be used as a context, which owns the nodes.
 
+    Parameters
+    ----------
+    options
+        Of the program, with a mode.
+    model
+        Of what is opened.
+    doors
+        (N, n + m) morphing parameters.
+    """
 
-def _open(
-    system: DoorSystem,
-    values: NDArray[np.float64],
-    task: tuple[Action, str],
-    experiment: Experiment,
-    strip: Path | None,
-) -> Trial:
-    """Open the door that is shown; save a strip of pictures of it if that is asked for."""
-    with tempfile.TemporaryDirectory() as folder:
-        recording = Path(folder) / "recording.gif"
-        if strip:
-            system.record(recording, experiment.recording.rate)
-        opened = system.open(experiment.goal(*task), lambda feedback: None)
-        if strip:
-            system.record(None, experiment.recording.rate)
-            save_strip(recording, strip, experiment.recording.strip)
-    result, is_open = opened.result, experiment.is_open(*task, opened.hinge)
-    return Trial(
-        values=values,
-        executed=result.success,
-        opened=is_open,
-        planning_time=result.planning_time,
-        contact_error=result.contact_error,
-        clearance=result.clearance,
-        attempts=result.attempts,
-        hinge=opened.hinge,
-        told=result.position,
-        reason=result.reason or ("" if is_open else "the door is not open in the physics"),
-        measured=opened.measured,
-    )
+    def __init__(
+        self, options: argparse.Namespace, model: KinematicModel, doors: NDArray[np.float64]
+    ) -> None:
+        self._options, self._experiment = options, Experiment.load()
+        self._task, self._doors = (model.actions[0], options.mode), doors
+        self._rooms = random_rooms(options, len(doors))
+        self._stack = ExitStack()
+
+    def __enter__(self) -> DoorTrials:
+        options, experiment = self._options, self._experiment
+        pace = experiment.real_time if options.real_time else experiment.evaluation
+        sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed}
+        sim["camera_mount"] = CAMERAS[options.camera]
+        if options.faults:
+            sim |= experiment.faults
+        with ExitStack() as stack:
+            stack.enter_context(ros_session("evaluate"))
+            self._system = stack.enter_context(DoorSystem(sim, options, experiment))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+    def __call__(self, number: int) -> Trial:
+        """Return what became of a door; save a strip of pictures of the first if asked for."""
+        values, strip = self._doors[number], None if number else self._options.strip
+        self._system.show(values, self._options.mode, self._rooms[number])
+        with tempfile.TemporaryDirectory() as folder:
+            recording = Path(folder) / "recording.gif"
+            rate = self._experiment.recording.rate
+            if strip:
+                self._system.record(recording, rate)
+            opened = self._system.open(self._experiment.goal(*self._task), lambda feedback: None)
+            if strip:
+                self._system.record(None, rate)
+                save_strip(recording, strip, self._experiment.recording.strip)
+        result = opened.result
+        is_open = self._experiment.is_open(*self._task, opened.hinge)
+        return Trial(
+            values=values,
+            executed=result.success,
+            opened=is_open,
+            planning_time=result.planning_time,
+            contact_error=result.contact_error,
+            clearance=result.clearance,
+            attempts=result.attempts,
+            hinge=opened.hinge,
+            told=result.position,
+            reason=result.reason or ("" if is_open else "the door is not open in the physics"),
+            measured=opened.measured,
+        )
 
 
 def add_control(parser: argparse.ArgumentParser) -> None:
@@ -120,8 +133,8 @@ def add_control(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def arguments(argv: list[str]) -> argparse.Namespace:
-    """Parse the command line without its ROS arguments."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of what is to be evaluated."""
     parser = argparse.ArgumentParser(prog="evaluate", description=__doc__)
     parser.add_argument("--doors", type=whole_number(1), default=50, help="default 50")
     add_mode_option(parser)
@@ -156,20 +169,44 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         help="the simulation runs no faster than reality, so that all seconds are alike",
     )
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of doors and noise")
-    parser.add_argument("--json", type=output_file, help="file to write the result to")
     parser.add_argument("--strip", type=output_file, help="file for pictures of the first door")
     add_robot_option(parser)
     add_object_option(parser)
-    return parser.parse_args(argv)
+    return parser
 
 
-def main() -> int:
+def prepare(options: argparse.Namespace) -> SharedExperiment[Trial]:
+    """Return the experiment that the options tell."""
+    experiment = Experiment.load()
+    model = experiment.kinematic_model(options.object, options.room)
+    options.mode = chosen_mode(model.actions[0], options.mode)
+    doors = experiment.random_objects(model, options.room, options.doors, options.seed)
+
+    def conclude(trials: list[Trial]) -> tuple[str, Any]:
+        result = tally(trials)
+        return table(result), {**{name: getattr(options, name) for name in NAMED}, **result}
+
+    return SharedExperiment(
+        title="evaluate",
+        unit="doors",
+        items=options.doors,
+        kind=Trial,
+        make=partial(DoorTrials, options, model, doors),
+        conclude=conclude,
+        depends_on={"model file": short_hash(experiment.model_file(options.object, options.room))},
+    )
+
+
+COMMAND = ExperimentCommand(
+    package="kmn_skill",
+    name="evaluate",
+    parser=parser,
+    prepare=prepare,
+    expected=EXPECTED,
+    outputs=("strip",),
+)
+
+
+def main() -> None:
     """Run the executable ``evaluate``."""
-    options = arguments(own_arguments())
-    with ros_session("evaluate"):
-        result = tally(run(options, Experiment.load()))
-    print(table(result))
-    if options.json:
-        named = {name: getattr(options, name) for name in NAMED}
-        write_json(options.json, {**named, **result})
-    return 0
+    COMMAND.start(own_arguments())

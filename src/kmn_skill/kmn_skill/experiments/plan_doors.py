@@ -6,15 +6,17 @@ Run as ``./run kmn_skill plan_doors --mode pull --doors 100``.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from kmn_perception.command_line.arguments import output_file, whole_number, write_json
+from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import columns
+from kmn_perception.configuration.hashes import short_hash
+from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
 from kmn_skill.experiments.settings import (
     Experiment,
     add_mode_option,
@@ -23,10 +25,12 @@ from kmn_skill.experiments.settings import (
     chosen_mode,
     random_recesses,
 )
-from kmn_skill.planning.plan import PlanningFailed, PlanReport, PlanRequest
+from kmn_skill.planning.plan import PlanningFailed, PlanReport
 from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import SOLUTIONS, Prototypes
+
+WORTHWHILE = 5  # doors of a process; for fewer its start, some seconds, does not pay
 
 
 class Planned(NamedTuple):
@@ -37,28 +41,41 @@ class Planned(NamedTuple):
     reason: str
 
 
-def plan_doors(
-    planner: Planner,
-    doors: NDArray[np.float64],
-    request: Callable[[NDArray[np.float64]], PlanRequest],
-) -> list[Planned]:
-    """Plan for doors of parameters (N, n + m), one after the other.
+class DoorPlanning:
+    """Plans for one door after the other; to be used as a context, which owns the planner.
 
     Parameters
     ----------
-    request
-        Returns what is asked for a door of parameters (n + m,).
+    doors
+        (N, n + m) parameters.
+    recesses
+        Of the doors in their walls, metres; None: they stand alone.
     """
-    planned = []
-    with tqdm(doors, unit="door") as bar:
-        for values in bar:
-            try:
-                report = planner.plan(request(values)).report
-                planned.append(Planned(values, report, ""))
-            except PlanningFailed as error:
-                planned.append(Planned(values, None, str(error)))
-            bar.set_postfix_str(f"{sum(door.report is not None for door in planned)} planned")
-    return planned
+
+    def __init__(
+        self, setup: PlanningSetup, robot: str, mode: str, doors: NDArray[np.float64],
+        recesses: Sequence[float] | None,
+    ) -> None:  # fmt: skip
+        prototypes = Prototypes.load(setup.action.motions, robot)
+        self._setup, self._mode, self._planner = setup, mode, Planner(setup, prototypes)
+        self._doors, self._recesses, self._experiment = doors, recesses, Experiment.load()
+
+    def __enter__(self) -> DoorPlanning:
+        self._planner.__enter__()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._planner.__exit__(*exception)
+
+    def __call__(self, number: int) -> Planned:
+        """Return what became of a door."""
+        values = self._doors[number]
+        recess = None if self._recesses is None else self._recesses[number]
+        request = self._experiment.request(self._setup, values, self._mode, recess)
+        try:
+            return Planned(values, self._planner.plan(request).report, "")
+        except PlanningFailed as error:
+            return Planned(values, None, str(error))
 
 
 def tally(doors: Sequence[Planned]) -> dict[str, Any]:
@@ -97,39 +114,49 @@ def table(result: dict[str, Any]) -> str:
     return "\n".join([columns(rows), *reasons])
 
 
-def main() -> int:
-    """Run the command."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of what is to be planned."""
     parser = argparse.ArgumentParser(prog="plan_doors", description=__doc__)
     parser.add_argument("--doors", type=whole_number(1), default=100, help="default 100")
     add_mode_option(parser)
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of the doors")
     parser.add_argument("--room", action="store_true", help="the doors stand in walls")
-    parser.add_argument("--json", type=output_file, help="file to write the result to")
     add_robot_option(parser)
     add_object_option(parser)
-    options = parser.parse_args()
+    return parser
+
+
+def prepare(options: argparse.Namespace) -> SharedExperiment[Planned]:
+    """Return the experiment that the options tell."""
     experiment = Experiment.load()
     model = experiment.kinematic_model(options.object, options.room)
     setup = PlanningSetup.load(model, options.robot)
     options.mode = chosen_mode(setup.action, options.mode)
     doors = experiment.random_objects(model, options.room, options.doors, options.seed)
-    recesses = iter(random_recesses(options.mode, options.doors, options.seed))
+    recesses = random_recesses(options.mode, options.doors, options.seed) if options.room else None
 
-    def request(values: NDArray[np.float64]) -> PlanRequest:
-        recess = next(recesses) if options.room else None
-        return experiment.request(setup, values, options.mode, recess)
+    def conclude(planned: list[Planned]) -> tuple[str, Any]:
+        result = tally(planned)
+        named = {name: getattr(options, name) for name in ("robot", "mode", "seed", "room")}
+        return table(result), {**named, "object": model.name, **result}
 
-    with Planner(setup, Prototypes.load(setup.action.motions, options.robot)) as planner:
-        planned = plan_doors(planner, doors, request)
-    result = tally(planned)
-    print(table(result))
-    if options.json:
-        named = {
-            "robot": options.robot,
-            "object": model.name,
-            "mode": options.mode,
-            "seed": options.seed,
-            "room": options.room,
-        }
-        write_json(options.json, {**named, **result})
-    return 0
+    return SharedExperiment(
+        title="plan_doors",
+        unit="doors",
+        items=options.doors,
+        kind=Planned,
+        make=partial(DoorPlanning, setup, options.robot, options.mode, doors, recesses),
+        conclude=conclude,
+        worthwhile=WORTHWHILE,
+        depends_on={"model file": short_hash(experiment.model_file(options.object, options.room))},
+    )
+
+
+COMMAND = ExperimentCommand(
+    package="kmn_skill", name="plan_doors", parser=parser, prepare=prepare, expected=(ValueError,)
+)
+
+
+def main() -> None:
+    """Run the command."""
+    COMMAND.start()

@@ -174,7 +174,11 @@ class Experiment(NamedTuple):
             raise ConfigurationError(
                 f"rooms are for '{self.room.model}', not for '{name}': leave one of them out"
             )
-        return KinematicModel.load(self.room.model if in_room else name or self.model)
+        return KinematicModel.load(self.model_file(name, in_room))
+
+    def model_file(self, name: str | Path = "", in_room: bool = False) -> Path:
+        """Return the file of the model that `kinematic_model` loads."""
+        return resources.find("config/models", self.room.model if in_room else name or self.model)
 
     def random_objects(
         self, model: KinematicModel, in_room: bool, count: int, seed: int

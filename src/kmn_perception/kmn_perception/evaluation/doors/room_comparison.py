@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.hashes import short_hash
 from kmn_perception.configuration.section import Section
 from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.settings import DoorSettings
@@ -20,7 +21,6 @@ from kmn_perception.evaluation.doors.label import DoorLabel, describe
 from kmn_perception.evaluation.doors.limit import errors_at_limit
 from kmn_perception.evaluation.doors.outcome import Outcome, judge
 from kmn_perception.evaluation.doors.settings import DoorErrorSettings, RoomEvaluationSettings
-from kmn_perception.evaluation.hashes import short_hash
 from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.model.room_model import RoomModel

@@ -62,6 +62,13 @@ class FrameFiles(NamedTuple):
     colour: Path | None
     description: FrameDescription
 
+    @property
+    def files(self) -> list[Path]:
+        """All files that there are."""
+        label = self.depth.with_name(f"{self.name}.json")
+        there = (self.depth, self.colour, label if label.is_file() else None)
+        return [file for file in there if file is not None]
+
     def read(self) -> DoorFrame:
         """Read the images.
 

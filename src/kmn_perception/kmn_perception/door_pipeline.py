@@ -141,16 +141,9 @@ class DoorPipeline:
         if not np.isfinite([*estimate.theta, *estimate.gamma]).all():
             return np.empty((0, 4, 4))
         values = np.concatenate([estimate.theta, estimate.gamma])
-        names, cubes = self.room.cubes(
-            values,
-            self.room.nuisances(**{OPENING: estimate.positions.get(HINGE, 0.0)}),
-            estimate.alternative or "none",
-            "left" if estimate.mirrored else "right",
-        )
-        drawn = cubes[[name.partition("_")[0] in ("panel", "handle") for name in names]]
-        reflected = np.linalg.det(drawn[:, :3, :3]) < 0.0
-        drawn[reflected, :3, 1] *= -1.0  # a cuboid is its own mirror image
-        return drawn
+        opening = estimate.positions.get(HINGE, 0.0)
+        side = "left" if estimate.mirrored else "right"
+        return self.room.door_bodies(values, opening, estimate.alternative, side)
 
     def _known_pose(self, view: DepthView) -> NDArray[np.float64] | None:
         """Return the pose (4, 4) of the camera if it is known without the floor in view."""

@@ -168,3 +168,22 @@ class RoomModel:
                     names.append(name)
                     cubes.append(pose @ cube)
         return tuple(names), np.array(cubes)
+
+    def door_bodies(
+        self, values: NDArray[np.float64], opening: float, handle: str = "", side: str = "right"
+    ) -> NDArray[np.float64]:
+        """Return panel and handle alone as maps (B, 4, 4) of the unit cube to the world.
+
+        Parameters
+        ----------
+        opening
+            Angle of the hinge, rad.
+        handle, side
+            See `cubes`; without a handle, the panel alone.
+        """
+        nuisances = self.nuisances(**{OPENING: opening})
+        names, cubes = self.cubes(values, nuisances, handle or "none", side)
+        drawn = cubes[[name.partition("_")[0] in ("panel", "handle") for name in names]]
+        reflected = np.linalg.det(drawn[:, :3, :3]) < 0.0
+        drawn[reflected, :3, 1] *= -1.0  # a cuboid is its own mirror image
+        return drawn

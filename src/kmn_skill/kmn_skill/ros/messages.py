@@ -17,6 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.messages import MessageError, cube_marker
 from kmn_perception.ros.stamps import duration_of, seconds, stamp_of
@@ -188,6 +189,17 @@ def hold_trajectory(
         time_from_start=duration_of(duration),
     )
     return JointTrajectory(joint_names=list(names), points=[point])
+
+
+def trajectory_from_plan(plan: Plan, action: Action, header: Header) -> JointTrajectory:
+    """Tell a whole plan: base x, y and yaw, the robot's other joints, then the object's."""
+    joints = [joint.name for joint in action.joints]
+    moved = np.hstack([plan.positions, plan.object_joints[:, : len(joints)]])
+    points = [
+        JointTrajectoryPoint(positions=places.tolist(), time_from_start=duration_of(float(time)))
+        for time, places in zip(plan.times, moved, strict=True)
+    ]
+    return JointTrajectory(header=header, joint_names=[*plan.joint_names, *joints], points=points)
 
 
 def markers_from_plan(

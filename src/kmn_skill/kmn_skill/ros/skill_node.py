@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
@@ -128,6 +129,7 @@ class SkillNode(OverridableNode):
         )
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.world_frame)
         self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
+        self._plan_publisher.publish(messages.trajectory_from_plan(plan, self._action, header))
 
     def send(self, part: Part) -> None:
         """Send a part of a plan."""
@@ -159,6 +161,7 @@ class SkillNode(OverridableNode):
     def _connect(self) -> None:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._path_publisher = self.create_publisher(MarkerArray, "planned_path", latched)
+        self._plan_publisher = self.create_publisher(JointTrajectory, "planned_trajectory", latched)
         for topic in self._states.joints:
             kind = Odometry if topic == BASE else JointState
             self.create_subscription(kind, topic, partial(self._on_state, topic), 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,7 @@ from kmn_perception.ros.messages.reading import (
 from kmn_perception.scene.depth_view import DepthView
 
 TO_GREY = {"mono8": None, "rgb8": cv2.COLOR_RGB2GRAY, "bgr8": cv2.COLOR_BGR2GRAY}
+TO_COLOUR = {"mono8": cv2.COLOR_GRAY2RGB, "rgb8": None, "bgr8": cv2.COLOR_BGR2RGB}
 SAME = 1e-3  # pixels; intrinsics that differ by less are the same
 
 
@@ -31,15 +34,26 @@ def grey_from_image(image: Image) -> NDArray[np.float32]:
     MessageError
         If it is malformed, or of another encoding than ``mono8``, ``rgb8`` and ``bgr8``.
     """
+    grey = _converted(image, TO_GREY)
+    return grey.reshape(grey.shape[:2]).astype(np.float32) / np.float32(255.0)
+
+
+def colour_from_image(image: Image) -> NDArray[np.uint8]:
+    """Read an image: (height, width, 3) red, green and blue; raises as `grey_from_image`."""
+    return _converted(image, TO_COLOUR)
+
+
+def _converted(image: Image, conversions: Mapping[str, int | None]) -> NDArray[np.uint8]:
+    """Return the pixels (height, width[, channels]) of an image after its encoding's conversion."""
     if image.width * image.height == 0:
         raise MessageError("image_empty", "the image has no pixels")
-    if image.encoding not in TO_GREY:
+    if image.encoding not in conversions:
         raise MessageError(
             "image_encoding",
-            f"the image has encoding '{image.encoding}', expected {', '.join(TO_GREY)}",
+            f"the image has encoding '{image.encoding}', expected {', '.join(conversions)}",
         )
-    conversion = TO_GREY[image.encoding]
-    channels = 1 if conversion is None else 3
+    conversion = conversions[image.encoding]
+    channels = 1 if image.encoding == "mono8" else 3
     check_rows("image", "step", image.step, image.width * channels)
     check_length("image", image.data, image.step, image.height)
     raw: NDArray[np.uint8] = np.ndarray(
@@ -48,8 +62,7 @@ def grey_from_image(image: Image) -> NDArray[np.float32]:
         image.data,
         strides=(image.step, channels, 1),
     )
-    grey = raw[..., 0] if conversion is None else cv2.cvtColor(raw, conversion)
-    return grey.astype(np.float32) / np.float32(255.0)
+    return raw if conversion is None else cv2.cvtColor(raw, conversion).astype(np.uint8, copy=False)
 
 
 def grey_in_view(

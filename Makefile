@@ -34,10 +34,11 @@ MODE := pull
 CONTROL := topic
 ROBOT :=
 OBJECT :=
+VIEW :=
 
 .PHONY: demo
-demo: build $(READY)simulation  ## let a simulated robot open a door in its wall, as it sees it, or a drawer (SEED=0 MODE=pull CONTROL=topic ROBOT=NAME OBJECT=NAME)
-	@./run kmn_skill demo $(if $(OBJECT),--object $(OBJECT),--room) --seed $(SEED) --mode $(MODE) --control $(CONTROL) $(ROBOT:%=--robot %)
+demo: build $(READY)simulation $(if $(VIEW),$(READY)viewer)  ## let a simulated robot open a door in its wall, as it sees it, or a drawer (SEED=0 MODE=pull CONTROL=topic ROBOT=NAME OBJECT=NAME VIEW=1)
+	@./run kmn_skill demo $(if $(OBJECT),--object $(OBJECT),--room) --seed $(SEED) --mode $(MODE) --control $(CONTROL) $(ROBOT:%=--robot %) $(if $(VIEW),--view)
 
 .PHONY: demo-bag
 demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures
@@ -48,12 +49,12 @@ evaluate: build  ## regenerate docs/results, table and figures (half an hour; in
 	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results
 
 .PHONY: test
-test: build lint $(READY)simulation  ## run the style checks and all tests
+test: build lint $(READY)simulation $(READY)browser  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m pytest --durations=30 $(TESTS)
 
 .PHONY: lint
-lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) and types (mypy)
+lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer  ## check style (ruff) and types (mypy)
 	@echo "==> Checking style and types"
 	@.venv/bin/ruff check --quiet .
 	@.venv/bin/ruff format --quiet --check .
@@ -64,10 +65,11 @@ lint: $(READY)test $(READY)training $(READY)evaluation  ## check style (ruff) an
 parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
 	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
 
-.PHONY: setup-training setup-evaluation setup-simulation setup-test
+.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-test
 setup-training: $(READY)training  ## install what the training needs
 setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
 setup-simulation: $(READY)simulation  ## install what the simulator needs (0.4 GB)
+setup-viewer: $(READY)viewer  ## install what the viewer needs
 setup-test: $(READY)test  ## install what the tests need
 
 .PHONY: clean

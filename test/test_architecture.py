@@ -24,7 +24,7 @@ TIERS = {
         ("training", "visualization"),
         ("evaluation",),
         ("ros",),
-        ("experiments", "bags", "benchmark"),
+        ("experiments", "bags", "benchmark", "viewer"),
     ),
     "kmn_sim": (("control",), ("robot",), ("world",), ("sensors",), ("ros",), ("checks",)),
     "kmn_skill": (("planning",), ("execution",), ("ros",), ("experiments",)),

@@ -22,7 +22,7 @@ from kmn_perception.ros.parameter_files import useless_files
 from kmn_perception.ros.parameters import declare_parameters, foreign_parameters
 from kmn_perception.ros.reports import report_periodically
 
-NODES = ("morph_node", "sim_node", "skill_node")
+NODES = ("morph_node", "sim_node", "skill_node", "viewer")
 
 
 def declared(graph: Any, stated: str, **overrides: Any) -> Node:

@@ -24,9 +24,9 @@ KEYS = {  # modules whose key is not their name
 }
 LIBRARIES = {
     "hypothesis", "jsonschema", "matplotlib", "networkx", "numba", "numpy", "pydantic", "pytest",
-    "scipy", "setuptools", "torch", "tqdm", "yaml",
+    "scipy", "setuptools", "torch", "tqdm", "websockets", "yaml",
 }  # fmt: skip
-WITHOUT_KEY = {"av", "robotic", "safetensors", "small_gicp"}
+WITHOUT_KEY = {"av", "robotic", "safetensors", "small_gicp", "trimesh", "viser"}
 STARTED = {"kmn_skill": {"kmn_sim", "rviz2"}}  # as programs
 SUBMODULES = {"torch.utils.tensorboard": "python3-tensorboard-pip"}  # that need something else
 

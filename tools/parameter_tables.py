@@ -12,6 +12,7 @@ DOCUMENTS = {
     "README.md": "morph_node",
     "docs/simulation.md": "sim_node",
     "docs/skill.md": "skill_node",
+    "docs/viewer.md": "viewer",
 }
 REFERENCE = "## All keys\n\n"  # the rest of docs/model_format.md is written here
 TABLE = re.compile(r"^\| parameter \| type \|.*\n(?:\|.*\n)*", re.MULTILINE)

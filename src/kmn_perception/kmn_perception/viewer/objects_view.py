@@ -129,7 +129,7 @@ def read_object(
         )
     bodies = models.bodies(message)
     covariance, uncertain = np.array(message.covariance, dtype=np.float64), []
-    if covariance.size == values.size**2:
+    if message.status in HOLDS and covariance.size == values.size**2:
         covariance = covariance.reshape(values.size, values.size)
         uncertain = uncertain_shapes(
             bodies, values, covariance, model.limits, settings.deviations, settings.min_extent

@@ -56,6 +56,7 @@ class Viewer(OverridableNode):
         names = [name.strip() for name in page.server_names.split(",") if name.strip()]
         self._inputs = Inputs(self)
         self._transforms = TransformListener(self, ThrottledWarnings(self))
+        self._transforms.listen(True)
         self._models = Models(settings.models)
         self._frame: dict[int, MorphingParameters] = {}
         self._objects: list[Perceived] = []
@@ -139,9 +140,8 @@ class Viewer(OverridableNode):
         return bool(self._server.get_clients())
 
     def _watch(self) -> None:
-        """Listen to what is much only as long as somebody looks on."""
+        """Listen to the camera only as long as somebody looks on, and tell what comes."""
         self._camera.listen(self._is_watched)
-        self._transforms.listen(self._is_watched)
         write(self._topics, self._inputs.table())
 
     def _draw(self) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.command_line.arguments import output_folder, whole_number
 from kmn_perception.command_line.columns import columns
+from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.experiments.door_system import DoorSystem, Opened
@@ -33,6 +34,10 @@ def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     task, pace = (model.actions[0], options.mode), experiment.demo
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed}
     sim["renderer"] = "software"  # whose light is ours
+    if options.view:
+        stated = load_node_parameters("viewer")
+        address = {name: stated[name].default for name in ("host", "port")}
+        options.viewer = {**address, "target": experiment.goal(*task).target}
     options.out.mkdir(parents=True, exist_ok=True)
     recording = options.out / f"{model.name}_{options.mode}_{options.seed}.gif"
     strip = recording.with_suffix(".png")
@@ -40,6 +45,10 @@ def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     print(f"starting {nodes} and skill_node (20 seconds)", flush=True)
     with DoorSystem(sim, options, experiment) as system:
         system.show(values, options.mode, random_rooms(options, 1)[0])
+        if options.viewer is not None:
+            host, port = options.viewer["host"], options.viewer["port"]
+            print(f"see http://{host}:{port} and open it there; Ctrl-C ends it", flush=True)
+            system.stay()
         system.record(recording, experiment.recording.rate)
         print(f"opening a {model.name} (seed {options.seed}, {options.mode}):", flush=True)
         narrator = Narrator()
@@ -94,6 +103,10 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         action="store_true",
         help="the door stands in a room, and is seen by depth and image",
     )
+    parser.add_argument(
+        "--view", action="store_true", help="show it in a browser, whose page opens the object"
+    )
+    parser.set_defaults(viewer=None)
     add_control(parser)
     parser.add_argument("--noise", choices=NOISES, default="kinect", help="default kinect")
     parser.add_argument(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -88,7 +89,8 @@ class DoorSystem:
         Of a program: ``robot``; ``object``, model of what is opened, and ``mode``, to which side;
         ``parameters``, where skill_node takes it from, one of ``SOURCES``; ``room``, whether it is
         a door that stands in a room, and is perceived by depth and image; and ``control``, how
-        skill_node moves the robot, ``topic`` or ``action``.
+        skill_node moves the robot, ``topic`` or ``action``; and, if it is to be started,
+        ``viewer``, parameters of that.
     experiment
         Models of the doors, and how long to wait for what.
 
@@ -107,11 +109,8 @@ class DoorSystem:
         self._sim = {**sim, **around}
         if in_rooms:
             self._sim["renderer"] = "software"  # EGL's highlights are none of a room's light
-        self._source, self._timeouts, self._in_rooms = (
-            options.parameters,
-            experiment.timeouts,
-            in_rooms,
-        )
+        self._source, self._in_rooms = options.parameters, in_rooms
+        self._timeouts, self._viewer = experiment.timeouts, vars(options).get("viewer")
         self._patience, self._opened = Patience.load(), experiment.opened
         self._control = options.control
         self._processes: dict[str, NodeProcess] = {}
@@ -199,6 +198,10 @@ class DoorSystem:
         answer: Future = accepted.result().get_result_async()
         return answer
 
+    def stay(self) -> None:
+        """Let the nodes run until one ends or the program is interrupted."""
+        self._client.wait(lambda: None, math.inf, "nobody")
+
     def record(self, file: Path | None, rate: float) -> None:
         """Let sim_node record what follows with so many pictures a second; None ends that."""
         self._set(record=str(file.absolute()) if file else "", record_rate=rate)
@@ -217,6 +220,8 @@ class DoorSystem:
             if self._in_rooms:  # the simulated sensor's depth is not off as a whole
                 morph["calibration"] = "calibrated"
             nodes.append(("kmn_perception", "morph_node", morph, []))
+        if self._viewer is not None:
+            nodes.append(("kmn_perception", "viewer", {**simulated, **self._viewer}, [door]))
         return nodes
 
     def _skill_parameters(self) -> dict[str, Any]:

@@ -162,9 +162,9 @@ def test_a_websocket_is_open_to_the_page_and_to_no_other(server: WebServer) -> N
     protocol = [Subprotocol(f"viser-v{viser.__version__}")]
     with connect(address, origin=Origin(server.address), subprotocols=protocol) as own:
         assert own.recv(timeout=10.0)
-    for foreign in ("http://evil.example", None):
+    for foreign in (Origin("http://evil.example"), None):
         with pytest.raises(InvalidStatus, match="403"):
-            connect(address, origin=foreign and Origin(foreign), subprotocols=protocol)
+            connect(address, origin=foreign, subprotocols=protocol)
 
 
 def test_an_address_where_nobody_can_listen_is_refused(server: WebServer) -> None:

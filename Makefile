@@ -48,10 +48,14 @@ demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all bo
 evaluate: build  ## regenerate docs/results, table and figures (half an hour; interrupted, it goes on)
 	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results
 
-.PHONY: test
-test: build lint $(READY)simulation $(READY)browser  ## run the style checks and all tests
+# Tests of one file run one after the other, files side by side; each with one thread of its own.
+.PHONY: test test-all
+test: SELECTED := -m "not slow"
+test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
+test-all: build lint $(READY)simulation $(READY)browser  ## run the style checks and all tests
 	@echo "==> Testing"
-	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m pytest --durations=30 $(TESTS)
+	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
+	    --numprocesses=auto --dist=loadfile --durations=30 $(SELECTED) $(TESTS)
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer  ## check style (ruff) and types (mypy)

@@ -135,11 +135,12 @@ class SkillPanel:
         """Take what the skill of this node's namespace reports, whoever sent its goal."""
         self._inputs.hear("/diagnostics")
         space = self._node.get_namespace().rstrip("/")
-        for status in message.status:
-            name, _, what = status.name.rpartition("/")
-            if name == space and what.endswith(GOALS):
-                last = next((v.value for v in status.values if v.key == "last"), "")
-                self._phase = f"{status.message}; last: {last}"
+        with self._inputs.part("/diagnostics"):
+            for status in message.status:
+                name, _, what = status.name.rpartition("/")
+                if name == space and what.endswith(GOALS):
+                    last = next((v.value for v in status.values if v.key == "last"), "")
+                    self._phase = f"{status.message}; last: {last}"
 
 
 def code_name(code: int) -> str:

@@ -187,6 +187,7 @@ def test_a_seed_gives_the_same_errors_again_and_another_seed_others(tmp_path: Pa
     assert first == again != other
 
 
+@pytest.mark.slow
 def test_several_processes_measure_the_same_as_one(tmp_path: Path) -> None:
     few = ("--samples", "51", "--methods", "kmn_paper", "information_limit", "--jobs")
     one, two = (run(tmp_path, "box_a", *few, jobs)["methods"] for jobs in ("1", "2"))

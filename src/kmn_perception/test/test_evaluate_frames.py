@@ -45,6 +45,7 @@ def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_it_writes_statistics_and_pictures_with_the_baselines_beside(tmp_path: Path) -> None:
     frames, out = tmp_path / "frames", tmp_path / "pictures"
     frames.mkdir()

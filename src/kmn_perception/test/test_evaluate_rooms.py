@@ -70,6 +70,7 @@ def test_a_row_of_each_table_is_printed(run: tuple[dict[str, Any], str]) -> None
         assert sum(line.startswith(f"{kind} ") for line in lines) == 1
 
 
+@pytest.mark.slow
 def test_several_processes_find_the_same_as_one(
     run: tuple[dict[str, Any], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

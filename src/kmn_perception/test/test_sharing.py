@@ -132,6 +132,7 @@ def test_shards_are_joined_to_what_one_run_gives(
     assert joined == whole
 
 
+@pytest.mark.slow
 def test_a_killed_shard_goes_on_where_it_was(tmp_path: Path) -> None:
     file, whole = tmp_path / "killed.jsonl", tmp_path / "whole.json"
     program, *options = TINY["objects"].replace("--samples 5", "--samples 150").split()

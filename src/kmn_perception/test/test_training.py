@@ -83,6 +83,7 @@ def test_two_processes_train_together(tmp_path: Path) -> None:
     assert by_step[-1][-1] < 0.2 * by_step[-1][0]
 
 
+@pytest.mark.slow
 def test_the_papers_network_learns_too(tmp_path: Path) -> None:
     out = tmp_path / "w.safetensors"
     result = run(out, "--config", "paper/box_a")
@@ -133,6 +134,7 @@ def test_wrong_settings_are_refused(tmp_path: Path, line: str, message: str) -> 
         load_training_settings(file)
 
 
+@pytest.mark.slow
 def test_more_jobs_make_the_same_data(tmp_path: Path) -> None:
     """Compared are the weights, which no other data would give."""
     one, three = tmp_path / "one.safetensors", tmp_path / "three.safetensors"
@@ -145,6 +147,7 @@ def test_more_jobs_make_the_same_data(tmp_path: Path) -> None:
             np.testing.assert_array_equal(tensor.numpy(), load_file(str(three))[name].numpy())
 
 
+@pytest.mark.slow
 def test_a_training_goes_on_from_a_weight_file(tmp_path: Path) -> None:
     out = tmp_path / "w.safetensors"
     few = ["--samples", "100", "--epochs", "1", "--rounds", "0"]

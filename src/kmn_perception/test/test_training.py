@@ -1,9 +1,11 @@
 """The training tool with a tiny budget: it learns, resumes to the same weights, and is refused."""
 
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,6 +83,64 @@ def test_two_processes_train_together(tmp_path: Path) -> None:
     errors = weights.load(out, KinematicModel.load("box_a")).metadata["errors"]
     by_step = errors["by_round_and_step"]
     assert by_step[-1][-1] < 0.2 * by_step[-1][0]
+
+
+class Machines:
+    """Two machines that train together, each with a folder of its own or both with the same."""
+
+    def __init__(self, folder: Path, shared: bool) -> None:
+        folders = [folder, folder] if shared else [folder / "0", folder / "1"]
+        for each in folders:
+            each.mkdir(parents=True, exist_ok=True)
+        self.out = folders[0] / "w.safetensors"
+        self.runs = [each / "run" for each in folders]
+
+    def start(self) -> list[subprocess.Popen[str]]:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        torchrun = [sys.executable, "-m", "torch.distributed.run", "--nnodes=2"]
+        torchrun += ["--master-addr=127.0.0.1", f"--master-port={port}"]
+        command = [*COMMAND[1:], "--out", str(self.out), *SMALL]
+        return [
+            subprocess.Popen(
+                [*torchrun, f"--node-rank={rank}", *command, "--run", str(folder)],
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            for rank, folder in enumerate(self.runs)
+        ]
+
+    def train(self) -> dict[str, Any]:
+        """Return the tensors that come of it."""
+        processes = self.start()
+        ends = [process.communicate(timeout=120)[1] for process in processes]
+        assert [process.returncode for process in processes] == [0, 0], ends
+        return dict(load_file(str(self.out)))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("phase", "shared"), [("data", True), ("fit", False)])
+def test_machines_that_were_interrupted_go_on_with_the_data_of_each(
+    phase: str, shared: bool, tmp_path: Path
+) -> None:
+    whole = Machines(tmp_path / "whole", shared=True).train()
+    interrupted = Machines(tmp_path / "interrupted", shared)
+    processes = interrupted.start()
+    shown = processes[0].stderr
+    assert shown is not None
+    assert any(phase in line and " 0/" not in line for line in shown)
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    for process in processes:
+        process.communicate(timeout=60)
+    there = [(folder / "checkpoint.pt").exists() for folder in interrupted.runs]
+    assert there == [True, shared]
+    resumed = interrupted.train()
+    assert resumed.keys() == whole.keys()
+    for name, tensor in whole.items():
+        np.testing.assert_array_equal(tensor.numpy(), resumed[name].numpy())
 
 
 @pytest.mark.slow

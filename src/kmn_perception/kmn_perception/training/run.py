@@ -95,6 +95,30 @@ class Run:
             ) from error
         return checkpoint
 
+    def save_share(self, rank: int, share: tuple[int, int]) -> None:
+        """Keep the round, and the number of its samples that a worker's own data hold."""
+        with replacing(self._share_file(rank)) as new:
+            new.write_text(json.dumps(share), encoding="utf-8")
+
+    def load_share(self, rank: int) -> tuple[int, int]:
+        """Return what was kept of a worker's data; none of any round where there is nothing.
+
+        Raises ``RunError`` if it is damaged.
+        """
+        file = self._share_file(rank)
+        if not file.exists():
+            return -1, 0
+        try:
+            of_round, filled = map(int, json.loads(file.read_text(encoding="utf-8")))
+        except (TypeError, ValueError) as error:
+            raise RunError(
+                f"{file} is damaged; use --restart to train from the beginning"
+            ) from error
+        return of_round, filled
+
+    def _share_file(self, rank: int) -> Path:
+        return self.folder / f"share{rank}.json"
+
 
 def _first_line(error: Exception) -> str:
     return str(error).split("\n")[0].strip() or type(error).__name__

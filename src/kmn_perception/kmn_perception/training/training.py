@@ -32,7 +32,8 @@ class TrainingState:
     """How far a run has come; what a checkpoint holds beside the networks and the optimiser."""
 
     round: int = 0  # 0 is the first training, then one for each augmentation
-    filled: int = 0  # samples in the data set
+    begun: int = 0  # samples that were in the data set when the round began
+    filled: int = 0  # samples in the data set, of the first worker
     step: int = 0  # batches trained in this round
     seconds: float = 0.0
     errors: list[list[float]] = field(default_factory=list)  # [round][prediction step]
@@ -82,17 +83,22 @@ class Training(ABC):
 
     def train(self) -> None:
         """Train to the end, from wherever the last checkpoint left it."""
-        checkpoint = self.run.load(self.workers.device)
+        checkpoint = self.workers.from_first(lambda: self.run.load(self.workers.device))
         if checkpoint is not None:
             self.state = TrainingState(**checkpoint["state"])
+            self.state.filled = self._filled()
             self.workers.say(f"resuming in round {self.state.round}")
         while self.state.round <= self.settings.rounds:
+            if checkpoint is None:
+                self.state.begun = self.state.filled
             self.begin_round()
             if checkpoint is not None:
                 self._restore(checkpoint)
                 checkpoint = None
-            self._save()
+            self._save_first()
+            self.workers.wait()  # none makes data of a round that the checkpoint does not know
             self.generate()
+            self._save()
             self._fit()
             self._validate()
             self.end_round()
@@ -210,6 +216,18 @@ class Training(ABC):
             raise KeyboardInterrupt
 
     def _save(self) -> None:
+        if self.workers.rank > 0:
+            self.run.save_share(self.workers.rank, (self.state.round, self.state.filled))
+        self._save_first()
+
+    def _filled(self) -> int:
+        """Return how far this worker's own data came: the checkpoint tells of the first's."""
+        if self.workers.rank == 0:
+            return self.state.filled
+        of_round, filled = self.run.load_share(self.workers.rank)
+        return filled if of_round == self.state.round else self.state.begun
+
+    def _save_first(self) -> None:
         if self.workers.rank == 0:
             networks = {name: network.state_dict() for name, network in self.networks.items()}
             self.run.save(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from types import TracebackType
+from typing import TypeVar
 
 import torch
 from torch import distributed, nn
@@ -11,6 +13,8 @@ from torch.nn.parallel import DistributedDataParallel
 from tqdm import tqdm
 
 from kmn_perception.training.run import RunError
+
+T = TypeVar("T")
 
 
 class Workers:
@@ -44,6 +48,18 @@ class Workers:
     def parallel(self, network: nn.Module) -> nn.Module:
         """Return the network such that gradients are averaged over all processes."""
         return DistributedDataParallel(network) if self.count > 1 else network
+
+    def from_first(self, make: Callable[[], T]) -> T:
+        """Return what the first process makes: others may have folders of their own."""
+        made = [make() if self.rank == 0 else None]
+        if self.count > 1:
+            distributed.broadcast_object_list(made, device=self.device)
+        return made[0]  # type: ignore[return-value]
+
+    def wait(self) -> None:
+        """Return when all processes have come here."""
+        if self.count > 1:
+            distributed.barrier()
 
     def say(self, text: str) -> None:
         """Print a line above the progress bar, once."""

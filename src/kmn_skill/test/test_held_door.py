@@ -23,6 +23,7 @@ VALUES = np.array([0.3, -0.5, 0.7, -0.2, 0.15, 0.02, -0.06])
 ACTION = KinematicModel.load("door").actions[0]
 ROBOT = np.zeros(11)
 CLOSED = np.zeros(2)
+PAD_WIDTH = 0.0255
 SETTINGS = GripSettings(max_grip_change=0.5, resume_distance=0.02)
 
 
@@ -61,7 +62,7 @@ def model() -> KinematicModel:
 @pytest.fixture
 def scene(model: KinematicModel) -> Scene:
     fingers = Fingers()
-    held = HeldDoor(model, ACTION, fingers, SETTINGS)
+    held = HeldDoor(model, ACTION, fingers, PAD_WIDTH, SETTINGS)
     held.see(VALUES, 0.0)
     return Scene(World(PlanningSetup.load(model), *model.split(VALUES)), fingers, held)
 
@@ -146,7 +147,7 @@ def test_a_hand_that_still_has_the_handle_tells_the_angles_after_a_restart(
     scene.held.grasp(ROBOT, CLOSED)
     grip = scene.held.grip
     assert grip is not None
-    later = HeldDoor(model, ACTION, scene.fingers, SETTINGS)
+    later = HeldDoor(model, ACTION, scene.fingers, PAD_WIDTH, SETTINGS)
     scene.move(hinge, -0.5, 0.01)
     assert later.resume(VALUES, grip, ROBOT)
     assert later.angles(ROBOT) == pytest.approx((hinge, -0.5), abs=1e-5)
@@ -159,7 +160,7 @@ def test_a_hand_that_is_elsewhere_does_not_hold_the_handle_any_more(
     scene.move(0.0, 0.0)
     scene.held.grasp(ROBOT, CLOSED)
     assert scene.held.grip is not None
-    later = HeldDoor(model, ACTION, scene.fingers, SETTINGS)
+    later = HeldDoor(model, ACTION, scene.fingers, PAD_WIDTH, SETTINGS)
     scene.fingers.pads += away
     assert not later.resume(VALUES, scene.held.grip, ROBOT)
     assert later.grip is None
@@ -198,11 +199,36 @@ def test_a_hand_that_stands_before_it_has_closed_tells_where_the_handle_must_be(
     scene.fingers.pads[:, 2] += [0.015, -0.015]
     with pytest.raises(BlockedHandError, match=r"0\.080 m apart") as raised:
         scene.held.grasp(ROBOT, CLOSED)
-    np.testing.assert_allclose(raised.value.offset, [0.0, 0.0, -0.015], atol=1e-9)
-    felt = with_handle_moved(model, VALUES, covariance, raised.value.offset)
+    offset = raised.value.offset(None)
+    np.testing.assert_allclose(offset, [0.0, 0.0, -0.015], atol=1e-9)
+    felt = with_handle_moved(model, VALUES, covariance, offset)
     before, after = (grasp_quantities(model, each) for each in (VALUES, felt))
     moved = (after - before)[HANDLE_POSITION]
     np.testing.assert_allclose(moved, [0.0, 0.0, -0.015], atol=1e-4)
+
+
+def test_a_hand_that_holds_a_lever_slantwise_came_too_low(
+    scene: Scene, model: KinematicModel
+) -> None:
+    """Its upper finger pressed the lever until edges of both held it: a lower place is worse."""
+    scene.move(0.0, 0.0)
+    rest, slant = scene.fingers.pads, 0.7
+    _, gamma = model.split(VALUES)
+    assert ACTION.unlatch is not None
+    lever = abs(ACTION.grasp.place(gamma) - ACTION.unlatch.origin(gamma))[1]
+    thickness = float(np.linalg.norm(rest[0] - rest[1]))
+    width = thickness / np.cos(slant) + PAD_WIDTH * np.tan(slant)
+    too_low = np.array([0.0, 0.0, lever * np.tan(slant)])
+    scene.fingers.pads = rest.mean(axis=0) - too_low + np.outer([0.5, -0.5], [0.0, 0.0, width])
+    with pytest.raises(BlockedHandError) as first:
+        scene.held.grasp(ROBOT, CLOSED)
+    scene.fingers.pads += np.outer([0.001, -0.001], [0.0, 0.0, 1.0])
+    with pytest.raises(BlockedHandError) as second:
+        scene.held.grasp(ROBOT, CLOSED)
+    assert first.value.offset(None)[2] < 0.0
+    assert first.value.offset(second.value)[2] < 0.0  # it had come nearer
+    np.testing.assert_allclose(first.value.offset(first.value), too_low, atol=1e-6)
+    assert second.value.offset(first.value)[2] > 0.0
 
 
 def test_fingers_that_closed_beside_the_handle_tell_nothing_of_where_it_is(scene: Scene) -> None:

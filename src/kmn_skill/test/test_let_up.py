@@ -37,7 +37,7 @@ def plan_for(planner: Planner, target: float, too_wide: float = 0.0) -> Plan:
 def held_angles(planner: Planner, plan: Plan) -> NDArray[np.float64]:
     """Return the angles (N, 2) of the prototype's joints from where the hand grasped on."""
     first = plan.phase("grasp").last
-    held = HeldDoor(MODEL, SETUP.action, planner.pads, GripSettings(1.0, 0.02))
+    held = HeldDoor(MODEL, SETUP.action, planner.pads, 0.0255, GripSettings(1.0, 0.02))
     held.see(MODEL.prototype, 0.0)
     held.grasp(plan.positions[first], np.zeros(2))
     return np.array([held.angles(positions) for positions in plan.positions[first:]])

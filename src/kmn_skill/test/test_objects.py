@@ -103,7 +103,7 @@ def test_the_hand_tells_how_far_a_drawer_is_out() -> None:
     grasped = np.array([OPEN.grasp.place(gamma) + across, OPEN.grasp.place(gamma) - across])
     at: NDArray[np.float64] = grasped @ pose[:3, :3].T + pose[:3, 3]
     fingers = {"pads": at}
-    held = HeldDoor(DRAWER, OPEN, lambda _: fingers["pads"], GripSettings(0.5, 0.02))
+    held = HeldDoor(DRAWER, OPEN, lambda _: fingers["pads"], 0.0255, GripSettings(0.5, 0.02))
     held.see(VALUES, 0.0)
     held.grasp(np.zeros(11), np.zeros(2))
     fingers["pads"] = at - 0.2 * pose[:3, 0]

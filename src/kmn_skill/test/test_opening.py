@@ -83,7 +83,13 @@ def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float
     for age in (0.2, 0.1, 0.0):
         covariance = 1e-8 * np.eye(len(seen))
         door.add(DoorObservation(NOW - age, "door", "world", names, seen, covariance, ""))
-    held = HeldDoor(MODEL, SETUP.action, lambda robot: np.zeros((2, 3)), SETTINGS.grip)
+    held = HeldDoor(
+        MODEL,
+        SETUP.action,
+        lambda robot: np.zeros((2, 3)),
+        SETUP.robot.planning.pads.width,
+        SETTINGS.grip,
+    )
     knowledge = Knowledge(MODEL, door, memory, watch, held, SETUP.settings.surroundings)
     planner, robot = Planner(), Robot()
     opening: Any = DoorOpening

@@ -59,13 +59,27 @@ class BlockedHandError(ExecutionError):
 
     Attributes
     ----------
-    offset
-        (3,) from where the handle was believed to where it must be, metres, world frame.
+    width
+        By which the fingers are apart, metres.
+    stopped, crooked
+        (3,) from where the handle was believed to where it must be, metres, world frame: if one
+        finger stands at a handle that cannot be moved there, and if they hold it slantwise.
     """
 
-    def __init__(self, text: str, offset: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        text: str,
+        width: float,
+        stopped: NDArray[np.float64],
+        crooked: NDArray[np.float64],
+    ) -> None:
         super().__init__("missed_handle", text)
-        self.offset = offset
+        self.width, self.stopped, self.crooked = width, stopped, crooked
+
+    def offset(self, before: BlockedHandError | None) -> NDArray[np.float64]:
+        """Return the likelier offset (3,); that it is stopped was tried if it stood so before."""
+        tried = before is not None and self.width >= before.width
+        return self.crooked if tried else self.stopped
 
 
 class ControllerError(SkillError):

@@ -58,6 +58,8 @@ class HeldDoor:
         Kinematic model of the door, and how its handle is grasped and moved.
     pads
         Returns where the two fingers touch (2, 3), world frame, at positions of the robot (J,).
+    pad_width
+        Of what touches of a finger, along the handle, metres.
 
     Attributes
     ----------
@@ -70,9 +72,11 @@ class HeldDoor:
         model: KinematicModel,
         action: Action,
         pads: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+        pad_width: float,
         settings: GripSettings,
     ) -> None:
-        self._model, self._action, self._pads, self.settings = model, action, pads, settings
+        self._model, self._action, self.settings = model, action, settings
+        self._pads, self._pad_width = pads, pad_width
         self._values: NDArray[np.float64] = np.zeros(len(model.parameters))
         self._angles = DoorAngles(0.0, 0.0)
         self._grip: Grip | None = None
@@ -121,7 +125,8 @@ class HeldDoor:
                 f"the handle is {expected:.3f} m thick"
             )
             if width > expected and self._action.unlatch is not None:
-                raise BlockedHandError(text, self._aside((width - expected) / 2.0))
+                stopped, crooked = self._aside(width)
+                raise BlockedHandError(text, width, stopped, crooked)
             raise ExecutionError(MISSED_HANDLE, text)
         back = np.linalg.inv(self._motion(angles))
         self._angles = DoorAngles(*angles.tolist())
@@ -207,20 +212,24 @@ class HeldDoor:
         _, gamma = self._model.split(self._values)
         return self._action.grasp.thickness(gamma)
 
-    def _aside(self, distance: float) -> NDArray[np.float64]:
-        """Return the offset (3,) of a handle between whose sides the hand stands so far off (m).
+    def _aside(self, width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return both offsets (3,) of a handle from a hand whose fingers stay so far apart (m).
 
-        Both fingers close alike. The first one that touches it takes the handle along to where it
-        can be pressed, and the hand closes; where it cannot be, the hand stands.
+        Both fingers close alike. The first one that touches a handle that lies aside takes it along
+        to where it can be pressed; where it cannot be, it is stopped there, and the hand stands.
+        What is pressed turns, and may come to lie crooked between the edges of both fingers.
         """
         theta, gamma = self._model.split(self._values)
-        grasp = self._action.grasp
-        origin = np.array([*grasp.body.centre(gamma), 1.0])
-        moved = self._motion(np.array([0.0, -STEP])) @ origin - origin
+        grasp, thickness = self._action.grasp, self._thickness()
+        place = np.array([*grasp.place(gamma), 1.0])
         axis = AXES.index(grasp.axis)
-        offset: NDArray[np.float64] = np.zeros(3)
-        offset[axis] = np.copysign(distance, moved[axis])
-        return self._model.transformation.matrix(theta)[:3, :3] @ offset
+        pressed = (self._motion(np.array([0.0, -STEP])) @ place - place)[axis]
+        # A bar of this thickness between edges that are so far apart, and the pad's width aside.
+        across = np.hypot(width, self._pad_width)
+        slant = np.arccos(thickness / across) - np.arctan2(self._pad_width, width)
+        along = self._model.transformation.matrix(theta)[:3, axis] * np.sign(pressed)
+        lever = abs(pressed) / STEP
+        return along * (width - thickness) / 2.0, -along * lever * np.tan(slant)
 
     def _in_door(self, robot: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where the pads are (2, 3), in the frame of the closed door."""

@@ -94,6 +94,7 @@ class DoorOpening:
         """Plan and follow, with some retries; raise if the last one fails."""
         settings = self._settings
         values, is_elsewhere, setback = self._wait_for_door(), False, ""
+        blocked: BlockedHandError | None = None
         for retries_left in reversed(range(settings.retries + 1)):
             try:
                 if is_elsewhere and self._planner.drives:
@@ -110,7 +111,8 @@ class DoorOpening:
                 if not retries_left:
                     raise
                 if isinstance(error, BlockedHandError):
-                    values, is_elsewhere = self._felt(values, error.offset), False
+                    values, is_elsewhere = self._felt(values, error.offset(blocked)), False
+                    blocked = error
                     self._commands.tell(f"{error}; trying again where the fingers found it")
                     continue
                 is_elsewhere |= self._carries_camera or error.reason in ELSEWHERE

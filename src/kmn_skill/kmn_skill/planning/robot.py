@@ -74,11 +74,20 @@ class Pad(NamedTuple):
 
 
 class Pads(NamedTuple):
-    """Those of the two fingers, and whereto they reach in the frame of the left one's joint."""
+    """Where the two fingers touch.
+
+    Attributes
+    ----------
+    forwards
+        Whereto the fingers reach, in the frame of the left one's joint.
+    width
+        Of what touches, across that, metres.
+    """
 
     left: Pad
     right: Pad
     forwards: tuple[float, float, float]
+    width: Positive
 
 
 class Grip(NamedTuple):

@@ -89,7 +89,13 @@ class SkillNode(OverridableNode):
             PerceivedDoor(settings.model, settings.world_frame, settings.door),
             DoorMemory(self._memory_file(setup), self.tell),
             StateWatch(settings.states, self._states.joints, continuous=setup.robot.continuous),
-            HeldDoor(settings.model, setup.action, planner.pads, settings.grip),
+            HeldDoor(
+                settings.model,
+                setup.action,
+                planner.pads,
+                setup.robot.planning.pads.width,
+                settings.grip,
+            ),
             setup.settings.surroundings,
         )
         self._statistics = SkillStatistics()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from kmn_skill.execution.goal import Client, Commands, Feedback
+from kmn_skill.execution.errors import ExecutionError
+from kmn_skill.execution.goal import Client, Commands, Feedback, Goal
 from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.plan_execution import Execution, ExecutionSettings
 from kmn_skill.execution.states import WorldState
@@ -82,6 +84,32 @@ class RobotFollowing:
             self.report(phase, progress, state)
             self._watch.wait(POLL_PERIOD)
         self._followed = None
+
+    def reach(self, plan: Plan, check: Callable[[Goal], None]) -> None:
+        """Follow a plan, and check where it led; what slips off there has come there.
+
+        Parameters
+        ----------
+        check
+            Raises ``ExecutionError`` where the positions to which the object came are not enough.
+
+        Raises
+        ------
+        InterruptedGoal, StatesError, ExecutionError, ControllerError
+            As ``follow`` and the check do.
+        """
+        slip: ExecutionError | None = None
+        try:
+            self.follow(plan)
+        except ExecutionError as error:
+            if error.reason != "slipped":
+                raise
+            self.hold()
+            slip = error
+        try:
+            check(Goal(self.handle, self.hinge))
+        except ExecutionError as missed:
+            raise slip or missed from None
 
     def hold(self) -> None:
         """Let the robot hold where it is: where it was just measured, else where it was sent.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,18 +94,16 @@ class DoorOpening:
     def _open(self, goal: Goal) -> None:
         """Plan and follow, with some retries; raise if the last one fails."""
         settings = self._settings
-        values, is_elsewhere, setback = self._wait_for_door(), False, ""
-        blocked: BlockedHandError | None = None
+        values, is_elsewhere, setback, blocked = self._wait_for_door(), False, "", None
+        tolerances = settings.handle_tolerance, settings.door_tolerance
+        check = partial(check_reached, goal=goal, action=self._action, tolerances=tolerances)
         for retries_left in reversed(range(settings.retries + 1)):
             try:
                 if is_elsewhere and self._planner.drives:
                     self._look_again(values)
                     self._memory.forget()
                     values = self._wait_for_door(values)
-                self._robot.follow(self._plan(values, goal))
-                reached = Goal(self._robot.handle, self._robot.hinge)
-                tolerances = settings.handle_tolerance, settings.door_tolerance
-                check_reached(reached, goal, self._action, tolerances)
+                self._robot.reach(self._plan(values, goal), check)
                 return
             except ExecutionError as error:
                 self._robot.hold()

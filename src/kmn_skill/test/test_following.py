@@ -1,0 +1,53 @@
+"""Where a plan led, also if the hand slips off at its end."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.errors import ExecutionError, Reason
+from kmn_skill.execution.following import RobotFollowing
+from kmn_skill.execution.goal import Goal
+from kmn_skill.execution.goal_check import check_reached
+
+ACTION = KinematicModel.load("door").actions[0]
+CHECK = partial(check_reached, goal=Goal(-0.7, -0.9), action=ACTION, tolerances=(0.15, 0.05))
+
+
+class Followed(RobotFollowing):
+    """A robot that came to some angles of handle and hinge, and failed there."""
+
+    def __init__(self, handle: float, hinge: float, reason: Reason | None) -> None:
+        self.handle, self.hinge, self.reason, self.holds = handle, hinge, reason, False
+
+    def follow(self, plan: Any) -> None:
+        if self.reason is not None:
+            raise ExecutionError(self.reason, "the hand is empty")
+
+    def hold(self) -> None:
+        self.holds = True
+
+
+def test_a_hand_that_slips_off_an_open_door_has_opened_it() -> None:
+    robot = Followed(-0.68, -0.88, "slipped")
+    robot.reach(None, CHECK)  # type: ignore[arg-type]
+    assert robot.holds
+
+
+@pytest.mark.parametrize(
+    ("handle", "hinge", "reason", "told"),
+    [
+        (-0.68, -0.6, "slipped", "the hand is empty"),
+        (-0.3, -0.88, "slipped", "the hand is empty"),
+        (-0.68, -0.88, "tracking", "the hand is empty"),
+        (-0.68, -0.6, None, "the hinge came to -0.60"),
+    ],
+)
+def test_what_fails_before_it_is_open_has_failed(
+    handle: float, hinge: float, reason: Reason | None, told: str
+) -> None:
+    with pytest.raises(ExecutionError, match=told):
+        Followed(handle, hinge, reason).reach(None, CHECK)  # type: ignore[arg-type]

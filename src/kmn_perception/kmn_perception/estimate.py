@@ -24,6 +24,11 @@ class Status(IntEnum):
     AMBIGUOUS = 6
 
 
+def status_name(status: int) -> str:
+    """Return the name of a status; the number where it has none."""
+    return next((each.name for each in Status if each == status), str(status))
+
+
 class Quantity(NamedTuple):
     """The state of a joint, or a parameter of the surroundings, with its standard deviation."""
 

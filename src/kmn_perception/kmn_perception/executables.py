@@ -3,6 +3,7 @@
 # Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
 EXECUTABLES = {
     "morph_node": ("kmn_perception.ros.morph_node", ""),
+    "print_parameters": ("kmn_perception.ros.print_parameters", ""),
     "viewer": ("kmn_perception.viewer.viewer_node", "viewer"),
     "replay": ("kmn_perception.bags.replay", ""),
     "make_example_bag": ("kmn_perception.bags.example_bag", ""),

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import NDArray
 
 from kmn_msgs.msg import MorphingParameters
-from kmn_perception.estimate import Status
+from kmn_perception.estimate import Status, status_name
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.room_model import HINGE, RoomModel, has_surroundings
 from kmn_perception.ros.messages import MessageError
@@ -91,11 +91,6 @@ class Perceived(NamedTuple):
         if message.status == Status.OK:
             return name
         return f"{name}: {status_name(message.status)}, {message.reason}"
-
-
-def status_name(status: int) -> str:
-    """Return the name of a status; the number where it has none."""
-    return next((each.name for each in Status if each == status), str(status))
 
 
 def read_object(

@@ -52,28 +52,34 @@ evaluate: build  ## regenerate docs/results, table and figures (half an hour; in
 .PHONY: test test-all
 test: SELECTED := -m "not slow"
 test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
-test-all: build lint $(READY)simulation $(READY)browser  ## run the style checks and all tests
+test-all: build lint $(READY)simulation $(READY)browser $(READY)docs  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
 	    --numprocesses=auto --dist=loadfile --durations=30 $(SELECTED) $(TESTS)
 
 .PHONY: lint
-lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer  ## check style (ruff) and types (mypy)
+lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer $(READY)docs  ## check style (ruff) and types (mypy)
 	@echo "==> Checking style and types"
 	@.venv/bin/ruff check --quiet .
 	@.venv/bin/ruff format --quiet --check .
 	@.venv/bin/mypy --no-error-summary
 	@for folder in tools $(TESTS); do .venv/bin/mypy --no-error-summary $$folder || exit; done
 
+.PHONY: docs
+docs: $(READY)docs  ## build the documents as a site in outputs/site; broken links are errors
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build
+	@echo "==> outputs/site/index.html; with its search: .venv/bin/mkdocs serve"
+
 .PHONY: parameter-tables
 parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
 	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
 
-.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-test
+.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-docs setup-test
 setup-training: $(READY)training  ## install what the training needs
 setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
 setup-simulation: $(READY)simulation  ## install what the simulator needs (0.4 GB)
 setup-viewer: $(READY)viewer  ## install what the viewer needs
+setup-docs: $(READY)docs  ## install what the site of the documents needs
 setup-test: $(READY)test  ## install what the tests need
 
 .PHONY: clean

@@ -1,4 +1,4 @@
-"""README and docs state the parameters as the nodes have them, and name every executable."""
+"""The documents state the parameters as the nodes have them, and name every executable."""
 
 from __future__ import annotations
 
@@ -15,18 +15,23 @@ from kmn_perception.rooms.sampling import KINDS
 from kmn_perception.transforms.transform import Reason
 
 ROOT = Path(__file__).parents[1]
-PAGES = {
-    "README.md": ("morph_node", "kmn_perception"),
-    "docs/simulation.md": ("sim_node", "kmn_sim"),
-    "docs/skill.md": ("skill_node", "kmn_skill"),
+NODES = {
+    "docs/morph_node.md": "morph_node",
+    "docs/simulation.md": "sim_node",
+    "docs/skill.md": "skill_node",
+    "docs/viewer.md": "viewer",
+}
+EXECUTABLES = {
+    "docs/programs.md": "kmn_perception",
+    "docs/simulation.md": "kmn_sim",
+    "docs/skill.md": "kmn_skill",
 }
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", NODES)
 def test_the_parameters_stand_there_as_they_are_stated(page: str) -> None:
-    node, _ = PAGES[page]
     text = (ROOT / page).read_text(encoding="utf-8")
-    assert f"\n{parameter_table(node)}\n\n" in text, "make parameter-tables"
+    assert f"\n{parameter_table(NODES[page])}\n" in text, "make parameter-tables"
 
 
 def executables(package: str) -> set[str]:
@@ -34,11 +39,12 @@ def executables(package: str) -> set[str]:
     return set(runpy.run_path(str(ROOT / f"src/{package}/{package}/executables.py"))["EXECUTABLES"])
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", EXECUTABLES)
 def test_every_executable_stands_there(page: str) -> None:
-    _, package = PAGES[page]
     text = (ROOT / page).read_text(encoding="utf-8")
-    assert executables(package) <= set(re.findall(r"^\| `(\w+)", text, flags=re.MULTILINE))
+    assert executables(EXECUTABLES[page]) <= set(
+        re.findall(r"^\| `(\w+)", text, flags=re.MULTILINE)
+    )
 
 
 def test_what_is_to_be_run_is_an_executable_and_has_its_environment() -> None:
@@ -54,7 +60,7 @@ def test_what_is_to_be_run_is_an_executable_and_has_its_environment() -> None:
 def test_the_shared_memory_that_a_process_takes_stands_there() -> None:
     profile = (share_directory() / "config/fastdds.xml").read_text(encoding="utf-8")
     (size,) = re.findall(r"<segment_size>(\d+)</segment_size>", profile)
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/performance.md").read_text(encoding="utf-8")
     stated = re.search(r"needs (\d+) MiB of `/dev/shm` for each process", text)
     assert stated is not None
     assert int(stated[1]) * 2**20 == int(size)

@@ -49,7 +49,7 @@ def test_arguments_are_parameters_and_topics_of_the_nodes() -> None:
     assert set(demo["SIMULATED"]) <= set(load_node_parameters("sim_node"))
     noises = load_node_parameters("sim_node")["noise"].choices
     assert demo["SIMULATED"]["noise"] in noises
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/morph_node.md").read_text(encoding="utf-8")
     cells = re.findall(r"^\| (`[^|]+`) \| `\w+_msgs/", text, flags=re.MULTILINE)
     topics = {topic for cell in cells for topic in re.findall(r"`([^`]+)`", cell)}
     assert {topic for topic, _ in camera["TOPICS"].values()} <= topics

@@ -12,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("kmn_perception", "kmn_sim", "kmn_skill")
+CITATION, CHANGES = ROOT / "CITATION.cff", ROOT / "CHANGELOG.md"
 KEYS = {  # modules whose key is not their name
     "PIL": "python3-pil",
     "cv2": "python3-opencv",
@@ -85,3 +86,15 @@ def test_the_maintainer_is_a_placeholder_that_reaches_nobody() -> None:
     for file in files:
         addresses = re.findall(r"[\w.+-]+@[\w.-]+", file.read_text(encoding="utf-8"))
         assert addresses == ["maintainers@example.org"], file
+
+
+def test_all_files_state_one_version() -> None:
+    patterns = {"package.xml": r"<version>(.*?)</version>", "setup.py": r'version="(.*?)"'}
+    packages = ("kmn_msgs", *PACKAGES)
+    files = [f for p in packages for name in patterns if (f := ROOT / "src" / p / name).exists()]
+    stated = {f: re.findall(patterns[f.name], f.read_text(encoding="utf-8")) for f in files}
+    stated[CITATION] = re.findall(r"^version: (.*)$", CITATION.read_text("utf-8"), re.M)
+    newest = CHANGES.read_text("utf-8").split("\n## ")[1]
+    stated[CHANGES] = re.findall(r"\d+\.\d+\.\d+", newest.splitlines()[0])
+    assert len(stated) == 9
+    assert len({tuple(versions) for versions in stated.values()}) == 1, stated

@@ -71,13 +71,11 @@ def test_arguments_of_ros_are_those_after_its_mark(
     assert split_arguments(arguments) == (own, ros)
 
 
-def test_the_readmes_line_replays_under_another_name(
+def test_the_documents_line_replays_under_another_name(
     graph: Any, domain: int, tmp_path: Path
 ) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-    (line,) = re.findall(
-        r"^\./run (kmn_perception replay .* --topic-map .*)$", readme, re.MULTILINE
-    )
+    page = (Path(__file__).parents[1] / "docs/programs.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"^\./run (kmn_perception replay .* --topic-map .*)$", page, re.MULTILINE)
     package, executable, bag, *arguments = line.split()
     said = Message("/camera/depth/points", 10**18, serialize_message(String(data="hello")))
     write_bag(tmp_path / bag, {said.topic: "std_msgs/msg/String"}, [said])

@@ -16,6 +16,8 @@ from kmn_perception.ros.morph_node import MorphNode
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
+pytest.importorskip("viser")
+from kmn_perception.viewer.viewer_node import Viewer  # noqa: E402
 from kmn_sim.ros.sim_node import SimNode  # noqa: E402
 from kmn_skill.planning.robot import RobotModel  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
@@ -24,15 +26,16 @@ ROOT = Path(__file__).parents[1]
 CONTROLLERS = RobotModel.load("pr2").controllers  # with control:=action
 SEND_GOAL = "/_action/send_goal"
 OF_ALL_NODES = re.compile(
-    r"/rosout|/parameter_events|/\w+_node/\w+(_parameters(_atomically)?|_types|_description)"
+    r"/rosout|/parameter_events|/(\w+_node|viewer)/\w+(_parameters(_atomically)?|_types|_description)"
 )
 NODES: dict[str, tuple[type[Node], str, dict[str, Any]]] = {  # with all that they may have
-    "README.md": (MorphNode, "morph_node", {"model": "room_door"}),
+    "docs/morph_node.md": (MorphNode, "morph_node", {"model": "room_door"}),
     "docs/simulation.md": (SimNode, "sim_node", {"publish_clock": True, "image": True}),
     "docs/skill.md": (SkillNode, "skill_node", {"door_angles": "door_state"}),
+    "docs/viewer.md": (Viewer, "viewer", {"port": 0}),
 }
-NOT_AT_ONCE = {  # subscribed when they are needed, or of another node
-    "README.md": {
+NOT_AT_ONCE = {  # subscribed when they are needed, or served by another node
+    "docs/morph_node.md": {
         *("tf", "open_door", "operate_joint"),
         *("depth/image/compressedDepth", "image/compressed"),
     },
@@ -40,6 +43,10 @@ NOT_AT_ONCE = {  # subscribed when they are needed, or of another node
     "docs/skill.md": {
         *("tf", "tf_static", "odom", "cmd_vel"),
         *(each.name for each in CONTROLLERS.values()),
+    },
+    "docs/viewer.md": {
+        *("depth/image", "depth/camera_info", "points", "image", "tf"),
+        *("operate_joint", "reset"),  # which the buttons use
     },
 }
 

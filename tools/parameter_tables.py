@@ -9,7 +9,7 @@ from kmn_perception.model.model_format import schema, tables
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = {
-    "README.md": "morph_node",
+    "docs/morph_node.md": "morph_node",
     "docs/simulation.md": "sim_node",
     "docs/skill.md": "skill_node",
     "docs/viewer.md": "viewer",

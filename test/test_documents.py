@@ -77,3 +77,26 @@ def test_every_reason_why_a_pose_is_not_known_stands_there() -> None:
     (rows,) = re.findall(r"\| reason \| what is wrong \|\n(.*?)\n\n", text, flags=re.DOTALL)
     stated = re.findall(r"^\| `(\w+)` \|", rows, flags=re.MULTILINE)
     assert sorted(stated) == sorted(set(get_args(Reason)) - {"invalid"})
+
+
+def test_every_path_that_is_named_is_there() -> None:
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    paths = {
+        (page.name, path)
+        for page in pages
+        for path in re.findall(
+            r"`((?:config|docs|src|test|tools)/[\w./]+)`", page.read_text("utf-8")
+        )
+        if not re.search(r"NAME|ROBOT|USE", path)
+    }
+    assert len(paths) > 100
+    assert [(page, path) for page, path in paths if not (ROOT / path).exists()] == []
+
+
+def test_the_code_that_contributors_are_led_to_is_there() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    led = re.findall(r"`(\w+)`[\w ]*\s\(`(src/[\w/.]+\.py)`\)", text)
+    assert len(led) == 5
+    for name, path in led:
+        defined = rf"^(?:class {name}\b|{name}\b.* = )"
+        assert re.search(defined, (ROOT / path).read_text("utf-8"), re.MULTILINE), (name, path)

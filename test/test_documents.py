@@ -95,7 +95,7 @@ def test_every_path_that_is_named_is_there() -> None:
 
 def test_the_code_that_contributors_are_led_to_is_there() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    led = re.findall(r"`(\w+)`[\w ]*\s\(`(src/[\w/.]+\.py)`\)", text)
+    led = re.findall(r"`(\w+)`\s+\(`(src/[\w/.]+\.py)`\)", text)
     assert len(led) == 5
     for name, path in led:
         defined = rf"^(?:class {name}\b|{name}\b.* = )"

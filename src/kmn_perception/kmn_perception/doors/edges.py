@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kmn_perception.doors.candidates import Candidate
-from kmn_perception.doors.lines import Line, Pieces, gaussian_steps
+from kmn_perception.doors.lines import Line, Pieces, gaussian_steps, row_sums
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
 
@@ -36,19 +36,18 @@ def _subpixel(
 ) -> tuple[float, float]:
     """Return the place of an edge and the standard deviation of its mean, metres."""
     assert view.grey is not None
-    fine = settings.lines.fine_smoothing
+    fine, least = settings.lines.fine_smoothing, 0.6 * settings.lines.min_contrast
     reach = round(0.5 * settings.lines.tie / float(view.s[1] - view.s[0])) + int(np.ceil(3 * fine))
     first = max(line.column - reach, 0)
     columns = slice(first, line.column + reach + 1)
+    number = pieces.known.shape[0]
+    shown = pieces.body & (pieces.known[:, columns].mean(axis=1) > 0.7)
+    shade = row_sums(np.ascontiguousarray(view.grey[:, columns]), pieces.rows, number)[shown]
+    shade /= np.bincount(pieces.rows + 1, minlength=number + 1)[1:][shown, None]
+    profiles = line.sign * gaussian_steps(shade, fine)
+    near = np.abs(first + np.arange(profiles.shape[1]) - line.column) <= 3
     places = []
-    for k in np.flatnonzero(pieces.body):
-        if not pieces.known[k, columns].mean() > 0.7:
-            continue
-        shade = view.grey[pieces.rows == k, columns].mean(axis=0)
-        profile = line.sign * gaussian_steps(shade[None], fine)[0]
-        near = np.abs(first + np.arange(len(profile)) - line.column) <= 3
-        if profile[near].max() < 0.6 * settings.lines.min_contrast:
-            continue
+    for profile in profiles[profiles[:, near].max(axis=1, initial=0.0) >= least]:
         peak = int(np.where(near, profile, -1.0).argmax())
         window = slice(max(peak - 2, 0), peak + 3)
         weights = np.maximum(profile[window] - 0.5 * profile[peak], 0.0)

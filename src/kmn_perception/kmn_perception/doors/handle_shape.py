@@ -8,11 +8,13 @@ are upright.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.part_settings import ShapeSettings
@@ -24,7 +26,12 @@ KINDS = ("lever", "knob")
 _SIDE, _LEVEL, _FRONT, _FITTING = range(1, 5)  # faces by where they look, and what is behind
 _LENGTH = "handle_length"  # the nuisance that prolongs a lever
 _BESIDE = "key"  # the fitting's part that is none behind the handle
+_REAR_TO_FRONT = [0, 0, 1, 1]
 _FRACTION = 4  # bits of a polygon's pixels
+# What a cuboid's sides are, the corners between which they are, and where they look in the image.
+_SIDES = (
+    (_SIDE, 3, 0, 0, -1.0), (_SIDE, 1, 2, 0, 1.0), (_LEVEL, 2, 3, 1, -1.0), (_LEVEL, 0, 1, 1, 1.0),
+)  # fmt: skip
 
 
 class Explanation(NamedTuple):
@@ -59,6 +66,27 @@ class _Shape(NamedTuple):
     protrusion: float
 
 
+class _Shapes(NamedTuple):
+    """The cuboids of all shapes of a kind, see `_Box`: arrays (M, 2), and (M,) of the rest.
+
+    ``shape`` is the number of the shape, of ``count``, that a cuboid belongs to.
+    """
+
+    count: int
+    shape: NDArray[np.int64]
+    before: NDArray[np.float64]
+    along: NDArray[np.float64]
+    up: NDArray[np.float64]
+    label: NDArray[np.int64]
+    protrusion: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, shapes: Sequence[_Shape]) -> _Shapes:
+        """Return the cuboids of shapes."""
+        rows = [(i, *box, one.protrusion) for i, one in enumerate(shapes) for box in one.boxes]
+        return cls(len(shapes), *(np.array(column) for column in zip(*rows, strict=True)))
+
+
 def explain(
     view: WallView, kind: str, side: str, at: tuple[float, float], settings: ShapeSettings
 ) -> Explanation:
@@ -87,10 +115,14 @@ def explain(
     seen = np.dstack([grey**2 - off, grey, np.ones_like(grey)]) * known[..., None]
     sliding = _window(row - rows.start, settings.reach[1], pixel, len(grey))
     shifting = _window(column - columns.start, settings.reach[0], pixel, grey.shape[1])
-    shapes = _shapes(kind, settings.lengths)
-    drawn = (_labels(one, view.frame, side, at, settings.template, pixel) for one in shapes)
-    least = np.min([_unexplained(seen.astype(np.float32), labels) for labels in drawn], axis=0)
-    window = least[sliding, shifting]
+    sums = np.zeros((len(grey), grey.shape[1] + 1, 3))
+    np.cumsum(seen, axis=1, out=sums[:, 1:])
+    labels = _labels(
+        _shapes(kind, settings.lengths), view.frame, side, at, settings.template, pixel
+    )
+    window = _unexplained(
+        sums, labels, (sliding.start, sliding.stop), (shifting.start, shifting.stop)
+    )
     i, j = np.unravel_index(int(window.argmin()), window.shape)
     count = max(int(known.sum()), 1)
     misfit = (float((off * known).sum()) + float(window[i, j])) / count + settings.noise**2
@@ -103,69 +135,110 @@ def _window(middle: int, reach: float, pixel: float, count: int) -> slice:
     return slice(max(middle - steps, 0), min(middle + steps + 1, count))
 
 
-def _unexplained(seen: NDArray[np.float32], labels: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the squared error (rows, columns) of a shape at each place, less that without one.
+@njit(cache=True)
+def _unexplained(
+    sums: NDArray[np.float64],
+    labels: NDArray[np.uint8],
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+) -> NDArray[np.float64]:
+    """Return the squared error of the best shape, less that without one, by place of its middle.
 
     Parameters
     ----------
-    seen
-        (rows, columns, 3) of each pixel: the squared grey less the squared error without a handle,
-        the grey, and 1; all are 0 where nothing is known.
+    sums
+        (rows, columns + 1, 3) over the pixels to the left: of the squared grey less the squared
+        error without a handle, of the grey, and of 1; nothing of pixels that are not known.
     labels
-        (rows, columns) of what is seen of the shape about its middle; 0 beside it.
+        (S, h, w) of what is seen of each shape about its middle; 0 beside it.
+    rows, columns
+        First and last + 1 of the places.
     """
-    error = np.zeros(seen.shape[:2], np.float32)
-    for label in np.unique(labels[labels > 0]):
-        mask = (labels == label).astype(np.float32)
-        sums = cv2.filter2D(seen, cv2.CV_32F, mask, borderType=cv2.BORDER_CONSTANT)
-        error += sums[..., 0] - sums[..., 1] ** 2 / np.maximum(sums[..., 2], 0.5)
-    return error
+    _, height, width = labels.shape
+    least = np.full((rows[1] - rows[0], columns[1] - columns[0]), np.inf)
+    faces = np.zeros((labels.max() + 1, 3))
+    for shape in labels:
+        runs = _runs(shape)
+        for i in range(rows[0], rows[1]):
+            for j in range(columns[0], columns[1]):
+                faces[:] = 0.0
+                for n in range(len(runs)):
+                    y = i + runs[n, 0] - height // 2
+                    if 0 <= y < sums.shape[0]:
+                        begin = min(max(j + runs[n, 1] - width // 2, 0), sums.shape[1] - 1)
+                        end = min(max(j + runs[n, 2] - width // 2, 0), sums.shape[1] - 1)
+                        for k in range(3):
+                            faces[runs[n, 3], k] += sums[y, end, k] - sums[y, begin, k]
+                error = 0.0
+                for label in range(len(faces)):
+                    if faces[label, 2] > 0.5:
+                        error += faces[label, 0] - faces[label, 1] ** 2 / faces[label, 2]
+                least[i - rows[0], j - columns[0]] = min(least[i - rows[0], j - columns[0]], error)
+    return least
+
+
+@njit(cache=True)
+def _runs(labels: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return the runs (N, 4) of labels: row, first and last + 1 column, and the label."""
+    height, width = labels.shape
+    runs = np.empty((height * width, 4), np.int64)
+    count = 0
+    for row in range(height):
+        begin = 0
+        for column in range(1, width + 1):
+            if column == width or labels[row, column] != labels[row, begin]:
+                if labels[row, begin] > 0:
+                    runs[count, 0], runs[count, 1], runs[count, 2] = row, begin, column
+                    runs[count, 3] = labels[row, begin]
+                    count += 1
+                begin = column
+    return runs[:count]
 
 
 def _labels(
-    shape: _Shape,
+    shapes: _Shapes,
     frame: WallFrame,
     side: str,
     at: tuple[float, float],
     half: tuple[float, float],
     pixel: float,
 ) -> NDArray[np.uint8]:
-    """Return what is seen (rows, columns) of a shape whose middle is seen at a place.
+    """Return what is seen (S, rows, columns) of shapes whose middle is seen at a place.
 
     What stands before the panel is seen larger, and further from the point of the panel that is
     nearest to the camera.
     """
     rows, columns = (round(x / pixel) for x in half)
-    labels = np.zeros((2 * rows + 1, 2 * columns + 1), np.uint8)
-    sign, distance, height = 1.0 if side == "right" else -1.0, frame.distance, frame.height
-    nearer = 1.0 - shape.protrusion / distance
-    middle = at[0] * nearer, (at[1] - height) * nearer
-
-    def rectangle(before: float, box: _Box) -> NDArray[np.float64]:
-        """Return the corners (4, 2) of a box's face, pixels: lower left first, then around."""
-        scale = distance / (distance - before)
-        left, right = sorted(middle[0] + sign * a for a in box.along)
-        low, high = (middle[1] + z for z in box.up)
-        corners = np.array([[left, low], [right, low], [right, high], [left, high]]) * scale
-        off = (corners - [at[0], at[1] - height]) / pixel
-        return np.column_stack([columns + off[:, 0], rows - off[:, 1]])
-
-    def fill(corners: NDArray[np.float64], label: int) -> None:
-        points = np.rint(corners * 2**_FRACTION).astype(np.int32)
-        cv2.fillConvexPoly(labels, points, label, shift=_FRACTION)
-
-    for box in shape.boxes:
-        back, front = (rectangle(before, box) for before in box.before)
-        for i, j, axis, outward in ((3, 0, 0, -1), (1, 2, 0, 1), (2, 3, 1, -1), (0, 1, 1, 1)):
-            if outward * (back[i, axis] - front[i, axis]) > 0.0:  # it is not hidden by the front
-                face = _SIDE if axis == 0 else _LEVEL
-                fill(np.array([back[i], back[j], front[j], front[i]]), face)
-        fill(front, box.label)
+    labels = np.zeros((shapes.count, 2 * rows + 1, 2 * columns + 1), np.uint8)
+    sign, distance, level = 1.0 if side == "right" else -1.0, frame.distance, at[1] - frame.height
+    nearer = 1.0 - shapes.protrusion[:, None] / distance
+    along = np.sort(at[0] * nearer + sign * shapes.along, axis=1)
+    up = level * nearer + shapes.up
+    scale = (distance / (distance - shapes.before))[..., None]
+    # Of the rear and the front face the corners (M, 2, 4, 2): lower left first, then around.
+    x = columns + (along[:, None] * scale - at[0]) / pixel
+    y = rows - (up[:, None] * scale - level) / pixel
+    corners = np.stack([x[..., [0, 1, 1, 0]], y[..., [0, 0, 1, 1]]], axis=-1)
+    points = np.rint(corners * 2**_FRACTION).astype(np.int32, order="C")
+    beyond = corners[:, 0] - corners[:, 1]
+    sides = [
+        (
+            face,
+            points[:, _REAR_TO_FRONT, [i, j, j, i]].copy("C"),
+            outward * beyond[:, i, axis] > 0.0,
+        )
+        for face, i, j, axis, outward in _SIDES
+    ]
+    for m, shape in enumerate(shapes.shape):
+        for face, outlines, is_seen in sides:
+            if is_seen[m]:  # it is not hidden by the front
+                cv2.fillConvexPoly(labels[shape], outlines[m], face, shift=_FRACTION)
+        cv2.fillConvexPoly(labels[shape], points[m, 1], int(shapes.label[m]), shift=_FRACTION)
     return labels
 
 
 @cache
-def _shapes(kind: str, lengths: int) -> tuple[_Shape, ...]:
+def _shapes(kind: str, lengths: int) -> _Shapes:
     """Return a kind of handle in some lengths within the model's limits, with all fittings."""
     model = RoomModel.load(wall_weights.MODEL)
     door, names = model.model, [parameter.name for parameter in model.nuisance]
@@ -187,7 +260,7 @@ def _shapes(kind: str, lengths: int) -> tuple[_Shape, ...]:
             ]
             boxes = tuple(_box(*body, grip, face) for body in (*behind, *bodies))
             found[_Shape(boxes, face - float(grip[0]))] = None
-    return tuple(found)
+    return _Shapes.of(list(found))
 
 
 def _box(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.search_settings import LineSettings
@@ -108,15 +110,15 @@ def cut_to_pieces(view: WallView, before: float, behind: float, settings: LineSe
     else:
         sharp, known = _gradient(view.grey, usable, settings.smoothing)
     full = settings.piece / abs(float(view.z[1] - view.z[0]))
-    area = np.maximum(_sums(view.inside, rows, count), 1.0)
-    number = _sums(known, rows, count)
+    area = np.maximum(row_sums(view.inside, rows, count), 1.0)
+    number = row_sums(known, rows, count)
     return Pieces(
         gradient=np.where(
-            number > 0.5 * full, _sums(sharp, rows, count) / np.maximum(number, 1.0), 0.0
+            number > 0.5 * full, row_sums(sharp, rows, count) / np.maximum(number, 1.0), 0.0
         ).astype(np.float32),
         known=number > 0.5 * full,
-        hidden=(_sums(hides & view.inside, rows, count) / area)[body].mean(axis=0),
-        hollow=(_sums(hollow & view.inside, rows, count) / area)[body].mean(axis=0),
+        hidden=(row_sums(hides & view.inside, rows, count) / area)[body].mean(axis=0),
+        hollow=(row_sums(hollow & view.inside, rows, count) / area)[body].mean(axis=0),
         body=body,
         step=_steps(view, usable & ~hollow, rows, body, settings),
         sharp=sharp,
@@ -129,12 +131,7 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     body = pieces.body
     gradient, known = pieces.gradient[body], pieces.known[body]
     visible = known.sum(axis=0)
-    noise = np.array(
-        [
-            1.48 * np.median(np.abs(g[k])) if k.any() else 1.0
-            for g, k in zip(gradient, known, strict=True)
-        ]
-    )
+    noise = np.where(known.any(axis=1), 1.48 * _medians(np.abs(gradient), known), 1.0)
     least = np.maximum(settings.noise_factor * noise, settings.min_contrast)[:, None]
     found = []
     for sign in (1, -1):
@@ -152,6 +149,15 @@ def find_lines(pieces: Pieces, settings: LineSettings) -> list[Line]:
     return sorted(found)
 
 
+def _medians(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return the median (K,) of what is known in each row; infinite where nothing is."""
+    ordered = np.sort(np.where(known, values, np.float32(np.inf)), axis=1)
+    count = known.sum(axis=1)
+    rows = np.arange(len(values))
+    low, high = ordered[rows, np.maximum(count - 1, 0) // 2], ordered[rows, count // 2]
+    return 0.5 * (low + high)
+
+
 def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSettings) -> list[Line]:
     """Return the steps in depth beside which grey shows no edge."""
     size = np.abs(pieces.step).astype(np.float32)
@@ -162,6 +168,17 @@ def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSetting
         for c in np.flatnonzero(peak)
         if not any(abs(c - other) <= 4 for other in taken)
     ]
+
+
+def seen_again(line: Line, pieces: Pieces, lines: Sequence[Line], reach: float) -> Line | None:
+    """Return the same edge in a later view; None where it does not show within reach, pixels."""
+    if line.contrast == 0.0:  # a place at which grey shows no edge
+        return line._replace(step=float(pieces.step[line.column]))
+    near = (one for one in lines if one.sign == line.sign and one.contrast > 0.0)
+    nearest = min(near, key=lambda one: abs(one.column - line.column), default=None)
+    if nearest is None or abs(nearest.column - line.column) > reach:
+        return None
+    return nearest
 
 
 def gaussian_steps(
@@ -222,17 +239,16 @@ def _steps(
     return (left - right) / settings.step_noise * np.sqrt(share) * (share > 0.2)
 
 
-def _sums(
+@njit(cache=True)
+def row_sums(
     values: NDArray[np.float32] | NDArray[np.bool_], rows: NDArray[np.int64], count: int
 ) -> NDArray[np.float32]:
-    """Return sums (count, columns) over the rows of each piece, which lie together."""
-    numbers: Any = values.view(np.uint8) if values.dtype == np.bool_ else values
+    """Return sums (count, columns) over the rows of each piece."""
     sums = np.zeros((count, values.shape[1]), np.float32)
-    for k in range(count):
-        piece = np.flatnonzero(rows == k)
-        if len(piece):
-            of_piece = numbers[piece[0] : piece[-1] + 1]
-            sums[k] = cv2.reduce(of_piece, 0, cv2.REDUCE_SUM, dtype=cv2.CV_32F)[0]
+    for row in range(len(rows)):
+        if rows[row] >= 0:
+            for column in range(values.shape[1]):
+                sums[rows[row], column] += np.float32(values[row, column])
     return sums
 
 

@@ -56,7 +56,8 @@ def find_lintel(
     if view.grey is None:
         return Lintel(None, np.inf, 0.0)
     low, high = heights
-    steps = _steps(view)
+    reach = round(settings.beside[1] / float(view.s[1] - view.s[0]))
+    steps = _steps(view, slice(max(left - reach, 0), right + reach + 1))
     contrast, coverage = _rows(view, steps, inner, settings)
     likely = _likely(candidate)
     if likely is not None and likely[-1] > 0.5:
@@ -119,11 +120,13 @@ def _likely(candidate: Candidate) -> NDArray[np.float64] | None:
     return np.append(cells[at], probabilities[-1])
 
 
-def _steps(view: WallView) -> NDArray[np.float32]:
-    """Return the steps (rows, columns) of grey downwards."""
+def _steps(view: WallView, columns: slice) -> NDArray[np.float32]:
+    """Return the steps (rows, columns) of grey downwards; 0 in other columns."""
     assert view.grey is not None
-    shade = np.where(view.inside, view.grey, np.float32(0.0))
-    return gaussian_steps(shade, _SMOOTHING, axis=0)
+    steps = np.zeros_like(view.grey)
+    shade = np.where(view.inside[:, columns], view.grey[:, columns], np.float32(0.0))
+    steps[:, columns] = gaussian_steps(shade, _SMOOTHING, axis=0)
+    return steps
 
 
 def _rows(

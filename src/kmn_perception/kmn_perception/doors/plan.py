@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,8 @@ from numpy.typing import NDArray
 OUTWARD = {"left": -1.0, "right": 1.0}
 
 
-class Plan(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Plan:
     """Wall and panel as seen from above, as lines b x + c y = 1: x to the right, y away.
 
     Attributes
@@ -28,25 +31,29 @@ class Plan(NamedTuple):
     proud: float
     hinge: str
 
-    @property
+    @cached_property
     def away(self) -> NDArray[np.float64]:
         """(2,) the wall's normal, away from the camera."""
-        unit: NDArray[np.float64] = self.wall / np.linalg.norm(self.wall)
+        unit: NDArray[np.float64] = self.wall / math.hypot(*self.wall)
         return unit
 
-    @property
+    @cached_property
+    def distance(self) -> float:
+        """Of the camera from the frame's front, metres."""
+        return 1.0 / math.hypot(*self.wall) - self.proud
+
+    @cached_property
     def along(self) -> NDArray[np.float64]:
         """(2,) along the wall, to the right."""
         return _along(self.wall)
 
     def behind(self, point: NDArray[np.float64]) -> float:
         """Return how far behind the frame's front a point (2,) is, metres."""
-        return float((self.wall @ point - 1.0) / np.linalg.norm(self.wall) + self.proud)
+        return float(self.away @ point) - self.distance
 
     def frame_at(self, place: float) -> NDArray[np.float64]:
         """Return the point (2,) of the frame's front at a place along the wall, metres."""
-        distance = 1.0 / np.linalg.norm(self.wall) - self.proud
-        point: NDArray[np.float64] = distance * self.away + place * self.along
+        point: NDArray[np.float64] = self.distance * self.away + place * self.along
         return point
 
     def panel_at(self, side: str, place: float, hinge_place: float) -> NDArray[np.float64]:
@@ -67,8 +74,7 @@ class Plan(NamedTuple):
     def place_of_frame(self, direction: float) -> float:
         """Return the place along the wall at which the frame is seen in a direction."""
         ray = np.array([direction, 1.0])
-        distance = float(1.0 / np.linalg.norm(self.wall) - self.proud)
-        return float(self.along @ ray) * distance / float(self.away @ ray)
+        return float(self.along @ ray) * self.distance / float(self.away @ ray)
 
     def place_of_panel(self, side: str, direction: float, hinge_place: float) -> float:
         """Return the place along the wall of an edge whose panel is seen in a direction."""
@@ -82,5 +88,5 @@ class Plan(NamedTuple):
 
 def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the direction (2,) along a line (b, c), to the right."""
-    b, c = line / np.linalg.norm(line)
+    b, c = line / math.hypot(*line)
     return np.array([c, -b])

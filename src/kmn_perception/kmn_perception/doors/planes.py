@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
@@ -81,15 +82,33 @@ def _largest(
     if not apart.any():
         return None
     vectors = np.linalg.solve(corners[apart], values[apart, :, None])[..., 0]
-    some = np.flatnonzero(free)
-    near = np.abs(rays[some] @ vectors.T - inverse[some, None]) < settings.inlier * noise
-    vector = vectors[near.sum(axis=0).argmax()]
+    vector = vectors[_support(rays[free], inverse[free], vectors, settings.inlier * noise).argmax()]
     for _ in range(_REFITS):
         on_it = free & (np.abs(rays @ vector - inverse) < settings.inlier * noise)
         if on_it.sum() < 3:
             return None
-        vector = np.linalg.lstsq(rays[on_it], inverse[on_it], rcond=None)[0]
+        near = rays[on_it]
+        vector = np.linalg.solve(near.T @ near, near.T @ inverse[on_it])
     return vector, on_it
+
+
+@njit(cache=True)
+def _support(
+    rays: NDArray[np.float64],
+    inverse: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    reach: float,
+) -> NDArray[np.int64]:
+    """Return how many blocks (N,) lie within reach of each of the planes (T, 3), 1/m."""
+    counts = np.zeros(len(vectors), np.int64)
+    x, y = rays[:, 0].copy(), rays[:, 1].copy()
+    for t in range(len(vectors)):
+        a, b, c = vectors[t]
+        count = 0
+        for i in range(len(inverse)):
+            count += abs(a * x[i] + b * y[i] + c - inverse[i]) < reach
+        counts[t] = count
+    return counts
 
 
 def _triples(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.search_settings import WallViewSettings
@@ -116,16 +117,7 @@ def resample(
     camera: Camera,
 ) -> WallView:
     """Return what is seen of a plane at columns s and rows z, metres; see `view_wall`."""
-    scaled = _scaled_pixels(frame, s, z, camera)
-    inverse = 1.0 / np.maximum(scaled[2], np.float32(1e-3))
-    u, v = scaled[0] * inverse, scaled[1] * inverse
-    inside = (scaled[2] > camera.near) & (u > 0.0) & (u < camera.width - 1.0)
-    inside &= (v > 0.0) & (v < camera.height - 1.0)
-    seen = cv2.remap(depth, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
-    measured = (seen > 0.0) & inside
-    offset = np.full(seen.shape, np.nan, np.float32)
-    np.divide(1.0, seen, out=offset, where=measured)
-    offset -= inverse
+    u, v, inside, offset = _look(depth, *_scaled_pixels(frame, s, z, camera), camera.near)
     shade: NDArray[np.float32] | None = None
     if grey is not None:
         seen_grey = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -141,7 +133,8 @@ def _columns_in_view(
     """Return the columns (metres) of which something is in the image."""
     s = np.arange(-settings.reach, settings.reach, settings.pixel, dtype=np.float64)
     probes = np.linspace(*settings.heights, 13, dtype=np.float64)
-    u, v, depth = _scaled_pixels(frame, s, probes, camera)
+    along, over = _scaled_pixels(frame, s, probes, camera)
+    u, v, depth = over[:, :, None] + along[:, None, :]
     inside = (depth > camera.near) & (u > 0.0) & (u < (camera.width - 1.0) * depth)
     inside &= (v > 0.0) & (v < (camera.height - 1.0) * depth)
     visible = np.flatnonzero(inside.any(axis=0) & (np.hypot(s, frame.distance) < settings.reach))
@@ -150,13 +143,55 @@ def _columns_in_view(
 
 def _scaled_pixels(
     frame: WallFrame, s: NDArray[np.float64], z: NDArray[np.float64], camera: Camera
-) -> list[NDArray[np.float32]]:
-    """Return column times depth, row times depth, and depth (rows, columns) of a plane's points.
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return column times depth, row times depth, and depth of a plane's points.
 
-    They are affine in the columns s and rows z, metres.
+    They are affine in the columns s and rows z, metres: the sums of what belongs to a column,
+    (3, columns), and to a row, (3, rows).
     """
     origin = camera.matrix @ frame.points(s[:1], z[:1])[0]
     step_s, step_z = camera.matrix @ frame.right, camera.matrix @ frame.up
     along = origin[:, None] + step_s[:, None] * (s - s[0])
     over = step_z[:, None] * (z - z[0])
-    return [np.add.outer(over[k].astype(np.float32), along[k].astype(np.float32)) for k in range(3)]
+    return along.astype(np.float32), over.astype(np.float32)
+
+
+@njit(cache=True)
+def _look(
+    depth: NDArray[np.float32], along: NDArray[np.float32], over: NDArray[np.float32], near: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.float32]]:
+    """Return where a plane's points are seen in the image, and what is measured there.
+
+    Parameters
+    ----------
+    along, over
+        See `_scaled_pixels`.
+
+    Returns
+    -------
+    u, v
+        (rows, columns) pixels.
+    inside, offset
+        See `WallView`.
+    """
+    shape = over.shape[1], along.shape[1]
+    u, v = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    inside, offset = np.empty(shape, np.bool_), np.empty(shape, np.float32)
+    last_row, last_column = depth.shape[0] - np.float32(1.0), depth.shape[1] - np.float32(1.0)
+    for i in range(shape[0]):
+        for j in range(shape[1]):  # in vectors; what follows is not
+            w = over[2, i] + along[2, j]
+            w = w if w > np.float32(1e-3) else np.float32(1e-3)
+            offset[i, j] = np.float32(1.0) / w
+            u[i, j] = (over[0, i] + along[0, j]) * offset[i, j]
+            v[i, j] = (over[1, i] + along[1, j]) * offset[i, j]
+        for j in range(shape[1]):
+            x, y, measured = u[i, j], v[i, j], np.float32(0.0)
+            inside[i, j] = 0.0 < x < last_column and 0.0 < y < last_row
+            inside[i, j] &= over[2, i] + along[2, j] > near
+            if inside[i, j]:
+                measured = depth[int(np.rint(y)), int(np.rint(x))]
+            offset[i, j] = (
+                np.float32(1.0) / measured - offset[i, j] if measured > 0.0 else np.float32(np.nan)
+            )
+    return u, v, inside, offset

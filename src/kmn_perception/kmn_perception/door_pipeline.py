@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.door_finder import DoorFinder
-from kmn_perception.doors.frame_fusion import FrameFusion
+from kmn_perception.doors.door_tracker import DoorTracker
 from kmn_perception.doors.geometry import DOOR
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
@@ -100,7 +100,7 @@ class DoorPipeline:
         self.estimate_all(replace(view, intensity=grey))
 
     def estimate_all(
-        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+        self, view: DepthView, max_objects: int | None = None, past: DoorTracker | None = None
     ) -> list[ObjectEstimate]:
         """Estimate the door that the frame shows best; where there is none, tell why."""
         pose = self._known_pose(view)
@@ -127,9 +127,10 @@ class DoorPipeline:
                     )
                 ]
             frame = frame._replace(up=pose[2, :3].copy(), height=float(pose[2, 3]))
-        found = self.finder.find(frame)
-        if past is not None:
-            found = past.add(found, frame, pose)
+        if past is None:
+            found = self.finder.find(frame)
+        else:
+            found = past.find(self.finder, frame, pose, view.stamp)
         if found.status is DoorStatus.NO_DOOR:
             return [self._none(view, found.reason, _sensor_error(found, self.finder.settings))]
         found = found if pose is None else found.in_world(pose)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.frame_fusion import FrameFusion
+from kmn_perception.doors.door_tracker import DoorTracker
 from kmn_perception.estimate import Estimate, Status
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -80,7 +80,7 @@ class MorphPipeline:
         return self.estimate_all(view, 1)[0].estimate
 
     def estimate_all(
-        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+        self, view: DepthView, max_objects: int | None = None, past: DoorTracker | None = None
     ) -> list[ObjectEstimate]:
         """Estimate the morphing parameters of ``max_objects`` or all objects, the nearest first.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kmn_perception.doors.frame_fusion import FrameFusion
+from kmn_perception.doors.door_tracker import DoorTracker
 from kmn_perception.estimate import Estimate
 from kmn_perception.estimator import EstimatorSettings
 from kmn_perception.model.kinematic_model import KinematicModel
@@ -143,14 +143,15 @@ class Pipeline(Protocol):
         """Compile and load all that the first estimate needs, so that it is not slow."""
 
     def estimate_all(
-        self, view: DepthView, max_objects: int | None = None, past: FrameFusion | None = None
+        self, view: DepthView, max_objects: int | None = None, past: DoorTracker | None = None
     ) -> list[ObjectEstimate]:
         """Estimate ``max_objects`` or all objects; where there is none, a single one says why.
 
         Parameters
         ----------
         past
-            The frames before, with which doors in walls are fused; None: the frame by itself.
+            The frames before: where a door in its wall was, and what it is fused with; None: the
+            frame by itself.
         """
 
     def bodies(self, estimate: Estimate) -> NDArray[np.float64]:

@@ -236,9 +236,9 @@ def test_depth_alone_does_not_prove_rest() -> None:
 def test_fusion_begins_anew_where_the_camera_moves_unless_its_pose_is_known() -> None:
     first, second = frames(2, step=0.02)
     for pose, expected in ((None, 0.01), (np.eye(4), 0.005)):
-        fusion = FrameFusion(10)
-        fusion.add(door(door_width=0.0), first, pose)
-        found = fusion.add(door(door_width=0.01), second, pose)
+        fusion, camera = FrameFusion(10), RestingCamera(SETTINGS.resting)
+        fusion.add(door(door_width=0.0), pose, camera.rests(first))
+        found = fusion.add(door(door_width=0.01), pose, camera.rests(second))
         assert found.value("door_width") == pytest.approx(expected)
 
 

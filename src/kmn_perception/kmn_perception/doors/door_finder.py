@@ -4,24 +4,41 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from kmn_perception.doors.camera_check import doubt_upright
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
+from kmn_perception.doors.fusion import agree
+from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.layout import SIDES
-from kmn_perception.doors.lines import cut_to_pieces, find_lines
+from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines, seen_again
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.proposals import edge_probability, with_proposals
 from kmn_perception.doors.settings import Calibration, DoorSettings
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.view_cells import describe_cells
-from kmn_perception.doors.wall_view import WallView
+from kmn_perception.doors.wall_view import WallView, view_wall
 from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
 from kmn_perception.network import wall_weights
 from kmn_perception.network.wall_network import WallNetwork
+
+
+class Sighting(NamedTuple):
+    """What a search found.
+
+    Attributes
+    ----------
+    walls, candidate
+        Of a door that was found; else None.
+    """
+
+    estimate: DoorEstimate
+    walls: Walls | None = None
+    candidate: Candidate | None = None
 
 
 class DoorFinder:
@@ -60,53 +77,91 @@ class DoorFinder:
 
     def find(self, frame: Frame) -> DoorEstimate:
         """Find the door that the frame shows best, or say why there is none."""
+        return self.search(frame).estimate
+
+    def search(self, frame: Frame) -> Sighting:
+        """Find the door that the frame shows best, and where to look for it in the next one."""
         settings = self.settings
         try:
             walls = find_walls(frame, settings, np.random.default_rng(self.seed))
         except NoWallError as error:
-            return DoorEstimate.none(str(error))
+            return Sighting(DoorEstimate.none(str(error)))
         best = self._search(frame, walls)
-        if best.handle_side and walls.height_source is HeightSource.USUAL:
+        if best.estimate.handle_side and walls.height_source is HeightSource.USUAL:
             # By the handle's usual height the camera is somewhere else above the floor.
-            walls = walls.at_height(float(best.camera_pose[2, 3]))
+            walls = walls.at_height(float(best.estimate.camera_pose[2, 3]))
             best = self._search(frame, walls)
-        if frame.up is None and best.status is not DoorStatus.NO_DOOR:
-            doubt = doubt_upright(best, walls.planes, walls.up, settings)
-            best = DoorEstimate.none(doubt) if doubt else best
+        if frame.up is None and best.estimate.status is not DoorStatus.NO_DOOR:
+            doubt = doubt_upright(best.estimate, walls.planes, walls.up, settings)
+            best = Sighting(DoorEstimate.none(doubt)) if doubt else best
         return best
 
-    def _search(self, frame: Frame, walls: Walls) -> DoorEstimate:
+    def look_again(self, frame: Frame, last: Sighting) -> DoorEstimate | None:
+        """Measure a door where it was found; None unless it shows there as it did.
+
+        The camera must not have moved: vertical, wall, and what the network thought of it, are
+        those of the sighting.
+        """
+        walls, candidate, settings = last.walls, last.candidate, self.settings
+        if walls is None or candidate is None or not walls.are_given_as(frame):
+            return None
+        view = view_wall(candidate.view.frame, frame.depth, frame.grey, frame.camera, settings.view)
+        if view is None or view.offset.shape != candidate.view.offset.shape:
+            return None
+        pieces, lines = self._lines(view)
+        reach = settings.tracking.reach / float(view.s[1] - view.s[0])
+        left, right = (seen_again(candidate.edge(side), pieces, lines, reach) for side in SIDES)
+        if left is None or right is None:
+            return None
+        again = candidate._replace(view=view, pieces=pieces, lines=lines, left=left, right=right)
+        blocks = Blocks.of(frame.depth, frame.camera, settings.fit.pixel_noise, settings.planes)
+        measurement = measure(frame, blocks, again, walls.height_source, settings)
+        if measurement is None:
+            return None
+        found = judge(measurement, settings)
+        as_before = found.status is last.estimate.status
+        as_before &= agree(found, last.estimate, settings.tracking.disagree)
+        return found if as_before else None
+
+    def _search(self, frame: Frame, walls: Walls) -> Sighting:
         """Return the best door of the walls."""
         settings = self.settings
-        found: list[DoorEstimate] = []
+        found: list[Sighting] = []
         seen = is_sure = False
         bonus = settings.score.handle + settings.score.lintel + settings.verdict.rival
         for view in walls.views(frame, settings):
             for candidate in self._candidates(view)[: settings.candidates]:
                 seen = True
-                bar = max((door.score for door in found if door.found), default=-np.inf)
+                bar = max(
+                    (one.estimate.score for one in found if one.estimate.found), default=-np.inf
+                )
                 if candidate.score + bonus < bar:
                     break  # neither this nor a later one can be as good
                 measurement = measure(frame, walls.blocks, candidate, walls.height_source, settings)
                 if measurement is not None:
-                    found.append(judge(measurement, settings))
+                    door = judge(measurement, settings)
+                    found.append(Sighting(door, walls, candidate if door.found else None))
                     surely = min(edge_probability(measurement.candidate, side) for side in SIDES)
-                    is_sure |= (
-                        found[-1].status is DoorStatus.OK and surely >= settings.network.enough
-                    )
+                    is_sure |= door.status is DoorStatus.OK and surely >= settings.network.enough
             if is_sure:
                 break
         if not found:
             reason = "no wall beside a panel is seen" if seen else _no_edges(frame)
-            return DoorEstimate.none(reason)
-        return self._best(found)
+            return Sighting(DoorEstimate.none(reason))
+        best = self._best([one.estimate for one in found])
+        return next((one for one in found if one.estimate is best), Sighting(best))
 
-    def _candidates(self, view: WallView) -> list[Candidate]:
-        """Return the pairs of upright edges of a wall."""
+    def _lines(self, view: WallView) -> tuple[Pieces, list[Line]]:
+        """Return the pieces of a wall's view, and its upright edges."""
         settings, noise = self.settings, self.settings.fit.pixel_noise
         before, behind = settings.view.before * noise, settings.view.behind * noise
         pieces = cut_to_pieces(view, before, behind, settings.lines)
-        lines = find_lines(pieces, settings.lines)
+        return pieces, find_lines(pieces, settings.lines)
+
+    def _candidates(self, view: WallView) -> list[Candidate]:
+        """Return the pairs of upright edges of a wall."""
+        settings = self.settings
+        pieces, lines = self._lines(view)
         candidates = find_candidates(view, pieces, lines, settings)
         if self.network is None or view.grey is None:
             return candidates  # it was trained on images, and knows little of depth alone

@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.fusion import DoorFusion
-from kmn_perception.doors.resting import RestingCamera
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.walls import Frame
 
 
 class FrameFusion:
@@ -22,13 +20,11 @@ class FrameFusion:
     """
 
     def __init__(self, frames: int) -> None:
-        settings = DoorSettings.load().fusion
-        self._doors = DoorFusion(frames, settings)
-        self._camera = RestingCamera(settings.resting)
+        self._doors = DoorFusion(frames, DoorSettings.load().fusion)
         self._was_known = False
 
     def add(
-        self, found: DoorEstimate, frame: Frame, pose: NDArray[np.float64] | None
+        self, found: DoorEstimate, pose: NDArray[np.float64] | None, rests: bool
     ) -> DoorEstimate:
         """Return what this and the frames before tell of the door.
 
@@ -36,10 +32,11 @@ class FrameFusion:
         ----------
         pose
             (4, 4) of the camera in the world; None if it is not known.
+        rests
+            Whether the camera has not moved since the frame before.
         """
         is_known = pose is not None
-        rests = is_known or self._camera.rests(frame)
-        if is_known is not self._was_known or not rests:
+        if is_known is not self._was_known or not (is_known or rests):
             self._doors.restart()
         self._was_known = is_known
         return self._doors.add(found if pose is None else found.in_world(pose))

@@ -1,10 +1,10 @@
-"""Settings of the fusion of frames, see ``config/doors.yaml``."""
+"""Settings of the tracking and the fusion of frames, see ``config/doors.yaml``."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from kmn_perception.configuration.settings import Count, Fraction, Positive
+from kmn_perception.configuration.settings import Count, Fraction, NonNegative, Positive
 
 
 class ParameterShares(NamedTuple):
@@ -68,3 +68,21 @@ class FusionSettings(NamedTuple):
     handle: Fraction
     confirm: Count
     resting: RestSettings
+
+
+class TrackingSettings(NamedTuple):
+    """How a door is looked for where it was, while the camera rests.
+
+    Attributes
+    ----------
+    period
+        After which everything is searched anew, seconds.
+    reach
+        Within which an edge must show where it was, metres.
+    disagree
+        Joint standard deviations beyond which it is not the same door.
+    """
+
+    period: NonNegative
+    reach: Positive
+    disagree: Positive

@@ -14,7 +14,7 @@ from kmn_perception.configuration.settings import (
     Positive,
     load_settings,
 )
-from kmn_perception.doors.fusion_settings import FusionSettings
+from kmn_perception.doors.fusion_settings import FusionSettings, TrackingSettings
 from kmn_perception.doors.part_settings import HandleSettings, LintelSettings
 from kmn_perception.doors.search_settings import (
     FloorSettings,
@@ -197,6 +197,7 @@ class DoorSettings:
     reveal: RevealSettings
     prior: PriorSettings
     fusion: FusionSettings
+    tracking: TrackingSettings
     candidates: Count
     calibration: Calibration
     delivered: Calibration

@@ -53,6 +53,13 @@ class Frame(NamedTuple):
     up: NDArray[np.float64] | None = None
     height: float | None = None
 
+    @property
+    def given(self) -> NDArray[np.float64] | None:
+        """(4,) of both, where both are known."""
+        if self.up is None or self.height is None:
+            return None
+        return np.append(self.up, self.height)
+
 
 class Walls(NamedTuple):
     """The walls of a frame.
@@ -69,6 +76,8 @@ class Walls(NamedTuple):
         The frame's inverse depths, and all planes among them.
     frames
         Of the largest walls.
+    given
+        What was known of the camera before, see `Frame.given`.
     """
 
     up: NDArray[np.float64]
@@ -77,6 +86,7 @@ class Walls(NamedTuple):
     blocks: Blocks
     planes: list[Plane]
     frames: list[WallFrame]
+    given: NDArray[np.float64] | None
 
     def views(self, frame: Frame, settings: DoorSettings) -> Iterator[WallView]:
         """Yield the views of the walls that are in the image, the largest first."""
@@ -84,6 +94,12 @@ class Walls(NamedTuple):
             view = view_wall(wall, frame.depth, frame.grey, frame.camera, settings.view)
             if view is not None:
                 yield view
+
+    def are_given_as(self, frame: Frame) -> bool:
+        """Return whether the same is given of another frame's camera."""
+        if self.given is None or frame.given is None:
+            return self.given is frame.given
+        return np.allclose(self.given, frame.given)
 
     def at_height(self, height: float) -> Walls:
         """Return the walls as seen from another height above a floor that is not in view."""
@@ -125,7 +141,7 @@ def find_walls(frame: Frame, settings: DoorSettings, generator: np.random.Genera
     elif height is None:
         height, source = settings.prior.handle_height[0], HeightSource.USUAL
     frames = [WallFrame.of(wall.vector, up, height) for wall in walls[:_MAX_WALLS]]
-    return Walls(up, height, source, blocks, planes, frames)
+    return Walls(up, height, source, blocks, planes, frames, frame.given)
 
 
 def _up(frame: Frame, planes: Sequence[Plane], settings: DoorSettings) -> NDArray[np.float64]:

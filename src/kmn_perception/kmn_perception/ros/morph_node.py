@@ -19,7 +19,7 @@ from visualization_msgs.msg import MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
 from kmn_msgs.srv import EstimateMorphing
-from kmn_perception.doors.frame_fusion import FrameFusion
+from kmn_perception.doors.door_tracker import DoorTracker
 from kmn_perception.estimate import Estimate, Status
 from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
 from kmn_perception.ros.camera_poses import CameraPoses
@@ -53,13 +53,12 @@ class Active(NamedTuple):
 
     settings: MorphNodeSettings
     pipeline: Pipeline
-    past: FrameFusion | None
+    past: DoorTracker
 
     @classmethod
     def begin(cls, settings: MorphNodeSettings, pipeline: Pipeline) -> Active:
         """Begin with no frame in the past."""
-        number = settings.fused_frames
-        return cls(settings, pipeline, FrameFusion(number) if number > 1 else None)
+        return cls(settings, pipeline, DoorTracker(settings.fused_frames))
 
 
 class MorphNode(OverridableNode):

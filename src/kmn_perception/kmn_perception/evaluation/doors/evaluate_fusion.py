@@ -19,6 +19,8 @@ from kmn_perception.doors.door_estimate import DoorEstimate
 from kmn_perception.doors.door_finder import DoorFinder
 from kmn_perception.doors.frame_fusion import FrameFusion
 from kmn_perception.doors.geometry import DOOR
+from kmn_perception.doors.resting import RestingCamera
+from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
 from kmn_perception.evaluation.doors.error_statistics import coverage
 from kmn_perception.evaluation.doors.errors import UNITS
@@ -68,14 +70,15 @@ class FusionMeasurement:
 
     def measure(self, seed: int, frames: int, camera: Camera) -> RoomFrames:
         """Return what is found in a room; raise ``RuntimeError`` if a camera has no place there."""
-        fusion = FrameFusion(frames)
+        fusion, resting = FrameFusion(frames), RestingCamera(DoorSettings.load().fusion.resting)
         result = RoomFrames([], [], [])
         for number, seen in enumerate(make_sequence(seed, frames, camera.step), start=1):
             frame, pose = _as_found(seen), seen.room.camera.pose
             if camera.is_known:
                 frame = frame._replace(up=pose[2, :3].copy(), height=float(pose[2, 3]))
             found = self._finder.find(frame)
-            fused = fusion.add(found, frame, pose if camera.is_known else None)
+            rests = resting.rests(frame)
+            fused = fusion.add(found, pose if camera.is_known else None, rests)
             truth = describe(Section(label(seen, "", {}), "")).label
             result.alone.append(judge(found, truth, self._model, self._limits))
             if number in AFTER:

@@ -14,14 +14,15 @@ from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.fusion import agree
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.layout import SIDES
-from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines, seen_again
+from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines
 from kmn_perception.doors.measuring import measure
 from kmn_perception.doors.proposals import edge_probability, with_proposals
+from kmn_perception.doors.seen_again import columns_about, seen_again
 from kmn_perception.doors.settings import Calibration, DoorSettings
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.verdict import judge
 from kmn_perception.doors.view_cells import describe_cells
-from kmn_perception.doors.wall_view import WallView, view_wall
+from kmn_perception.doors.wall_view import WallView, resample
 from kmn_perception.doors.walls import Frame, NoWallError, Walls, find_walls
 from kmn_perception.network import wall_weights
 from kmn_perception.network.wall_network import WallNetwork
@@ -105,15 +106,15 @@ class DoorFinder:
         walls, candidate, settings = last.walls, last.candidate, self.settings
         if walls is None or candidate is None or not walls.are_given_as(frame):
             return None
-        view = view_wall(candidate.view.frame, frame.depth, frame.grey, frame.camera, settings.view)
-        if view is None or view.offset.shape != candidate.view.offset.shape:
-            return None
+        before, tracking = candidate.view, settings.tracking
+        columns = columns_about(candidate, tracking.beside)
+        view = resample(
+            before.frame, before.s[columns], before.z, frame.depth, frame.grey, frame.camera
+        )
         pieces, lines = self._lines(view)
-        reach = settings.tracking.reach / float(view.s[1] - view.s[0])
-        left, right = (seen_again(candidate.edge(side), pieces, lines, reach) for side in SIDES)
-        if left is None or right is None:
+        again = seen_again(candidate, view, pieces, lines, columns.start, tracking.reach)
+        if again is None:
             return None
-        again = candidate._replace(view=view, pieces=pieces, lines=lines, left=left, right=right)
         blocks = Blocks.of(frame.depth, frame.camera, settings.fit.pixel_noise, settings.planes)
         measurement = measure(frame, blocks, again, walls.height_source, settings)
         if measurement is None:

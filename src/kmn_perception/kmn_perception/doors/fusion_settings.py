@@ -77,6 +77,8 @@ class TrackingSettings(NamedTuple):
     ----------
     period
         After which everything is searched anew, seconds.
+    beside
+        How far beside its edges its wall is looked at, metres.
     reach
         Within which an edge must show where it was, metres.
     disagree
@@ -84,5 +86,6 @@ class TrackingSettings(NamedTuple):
     """
 
     period: NonNegative
+    beside: Positive
     reach: Positive
     disagree: Positive

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -168,17 +167,6 @@ def _steps_without_grey(pieces: Pieces, lines: list[Line], settings: LineSetting
         for c in np.flatnonzero(peak)
         if not any(abs(c - other) <= 4 for other in taken)
     ]
-
-
-def seen_again(line: Line, pieces: Pieces, lines: Sequence[Line], reach: float) -> Line | None:
-    """Return the same edge in a later view; None where it does not show within reach, pixels."""
-    if line.contrast == 0.0:  # a place at which grey shows no edge
-        return line._replace(step=float(pieces.step[line.column]))
-    near = (one for one in lines if one.sign == line.sign and one.contrast > 0.0)
-    nearest = min(near, key=lambda one: abs(one.column - line.column), default=None)
-    if nearest is None or abs(nearest.column - line.column) > reach:
-        return None
-    return nearest
 
 
 def gaussian_steps(

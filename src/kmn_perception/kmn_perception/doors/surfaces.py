@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.normal_equations import add_blocks
 from kmn_perception.doors.settings import Calibration, FitSettings
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
@@ -282,12 +283,9 @@ def _solve(
     for _ in range(_ROUNDS):
         information, right_side, counts = prior.copy(), prior @ expected, []
         for surface in surfaces:
-            rows = surface.derivatives(values)
-            near = np.abs(rows @ values - surface.inverse) < reach
-            rows = rows[near] / surface.noise
-            information += rows.T @ rows
-            right_side += rows.T @ surface.inverse[near] / surface.noise
-            counts.append(int(near.sum()))
+            rows, inverse = surface.derivatives(values), surface.inverse
+            equations = information, right_side
+            counts.append(add_blocks(*equations, rows, inverse, values, reach, surface.noise))
         if not information[FLOOR, FLOOR]:  # without a floor the height stays where it is
             information[FLOOR, FLOOR] += _FIRM
             right_side[FLOOR] += _FIRM * start[FLOOR]

@@ -13,7 +13,7 @@ from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
 
 ROWS = 64  # cells above each other, from the view's top
-_HIGH, _WIDE = 8, 4  # pixels of the view in a cell
+_HIGH, WIDE = 8, 4  # pixels of the view in a cell
 _SMOOTHING = 1.5  # pixels
 _STEP, _OFFSET = 0.4, 12.0  # largest step of the logarithm of grey, and offset in pixel noises
 _ASIDE = 2.0  # largest tangent of the angle to the wall's normal
@@ -37,8 +37,8 @@ def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]
     within = cv2.erode(view.inside.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
     right = _whole(gaussian_steps(shade, _SMOOTHING) * within)
     down = _whole(gaussian_steps(shade, _SMOOTHING, axis=0) * within)
-    columns = right.shape[1] // _WIDE
-    right = _mean_to(right, (right.shape[1], ROWS)).reshape(ROWS, columns, _WIDE)
+    columns = right.shape[1] // WIDE
+    right = _mean_to(right, (right.shape[1], ROWS)).reshape(ROWS, columns, WIDE)
     down = _mean_to(down, (columns, len(down))).reshape(ROWS, _HIGH, columns)
     measured = np.isfinite(view.offset)
     offset = np.where(measured, view.offset, np.float32(0.0))
@@ -61,7 +61,7 @@ def cells_of(view: WallView, noise: float, before: float) -> NDArray[np.float32]
 
 def column_of(view: WallView, cell: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the column of the view in the middle of a cell's column."""
-    return cell * _WIDE + 0.5 * (_WIDE - 1)
+    return cell * WIDE + 0.5 * (WIDE - 1)
 
 
 @overload
@@ -70,7 +70,7 @@ def cell_of(view: WallView, column: float) -> float: ...
 def cell_of(view: WallView, column: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def cell_of(view: WallView, column: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
     """Return the cells' columns of columns of the view."""
-    return (column - 0.5 * (_WIDE - 1)) / _WIDE
+    return (column - 0.5 * (WIDE - 1)) / WIDE
 
 
 def row_of(view: WallView, row: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -86,7 +86,7 @@ def height_of(view: WallView, row: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _whole(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the values of whole cells; missing rows at the bottom are 0."""
-    values = values[: ROWS * _HIGH, : values.shape[1] // _WIDE * _WIDE]
+    values = values[: ROWS * _HIGH, : values.shape[1] // WIDE * WIDE]
     missing = ROWS * _HIGH - len(values)
     return np.pad(values, ((0, missing), (0, 0))) if missing else values
 
@@ -94,7 +94,7 @@ def _whole(values: NDArray[np.float32]) -> NDArray[np.float32]:
 def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the means (ROWS, N) of cells."""
     values = _whole(values)
-    return _mean_to(values, (values.shape[1] // _WIDE, ROWS))
+    return _mean_to(values, (values.shape[1] // WIDE, ROWS))
 
 
 def _mean_to(values: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
@@ -114,7 +114,7 @@ def describe_cells(settings: DoorSettings) -> dict[str, Any]:
     view, noise = settings.view, settings.fit.pixel_noise
     return {
         "rows": ROWS,
-        "pixels": [_HIGH, _WIDE],
+        "pixels": [_HIGH, WIDE],
         "pixel": view.pixel,
         "heights": list(view.heights),
         "smoothing": _SMOOTHING,

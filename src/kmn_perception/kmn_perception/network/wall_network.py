@@ -114,6 +114,11 @@ class Proposals(NamedTuple):
     top: NDArray[np.float32]
     handle: NDArray[np.float32]
 
+    def between(self, first: int, last: int) -> Proposals:
+        """Return what is proposed for the columns of cells first to last - 1."""
+        edges = np.concatenate([self.edges[:, first:last], self.edges[:, -1:]], axis=1)
+        return Proposals(edges, self.top[:, first:last], self.handle[..., first:last])
+
     def top_over(self, first: int, last: int) -> NDArray[np.float64]:
         """Return probabilities (ROWS + 1,) of the top of a door over columns; the last: unseen."""
         logits = np.append(self.top[:, first : last + 1].mean(axis=1, dtype=np.float64), 0.0)

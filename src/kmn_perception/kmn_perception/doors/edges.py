@@ -9,6 +9,8 @@ from kmn_perception.doors.lines import Line, Pieces, gaussian_steps, row_sums
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallView
 
+_FEWEST = 3  # pieces of an edge that tell where it is
+
 
 def measure_edge(candidate: Candidate, line: Line, settings: DoorSettings) -> tuple[float, float]:
     """Return the direction of an edge and its standard deviation, if it is the door's.
@@ -42,6 +44,10 @@ def _subpixel(
     columns = slice(first, line.column + reach + 1)
     number = pieces.known.shape[0]
     shown = pieces.body & (pieces.known[:, columns].mean(axis=1) > 0.7)
+    pixel = float(view.s[1] - view.s[0])
+    unknown = float(view.s[line.column]), 2.0 * pixel
+    if shown.sum() < _FEWEST:
+        return unknown
     shade = row_sums(np.ascontiguousarray(view.grey[:, columns]), pieces.rows, number)[shown]
     shade /= np.bincount(pieces.rows + 1, minlength=number + 1)[1:][shown, None]
     profiles = line.sign * gaussian_steps(shade, fine)
@@ -53,9 +59,8 @@ def _subpixel(
         weights = np.maximum(profile[window] - 0.5 * profile[peak], 0.0)
         at = first + window.start + np.arange(len(weights))
         places.append(float((weights * at).sum() / weights.sum()))
-    pixel = float(view.s[1] - view.s[0])
-    if len(places) < 3:
-        return float(view.s[line.column]), 2.0 * pixel
+    if len(places) < _FEWEST:
+        return unknown
     found = np.array(places)
     middle = np.median(found)
     scatter = max(1.48 * float(np.median(np.abs(found - middle))), 0.6)

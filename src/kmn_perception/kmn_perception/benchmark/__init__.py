@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
-from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 
-from kmn_perception.benchmark import stages, transport
+from kmn_perception.benchmark import callbacks, stages, transport
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
@@ -48,7 +46,11 @@ def benchmark(node: Node, frames: int) -> dict[str, Any]:
     )
     return {
         "stages": stages.measure(chain, frames),
-        "transport": transport.measure(node, settings, frames),
+        "callbacks": callbacks.measure(frames),
+        "transport": {
+            sender: transport.measure(node, settings, frames, sender)
+            for sender in transport.SENDERS
+        },
     }
 
 
@@ -63,13 +65,14 @@ def report(result: dict[str, Any]) -> str:
     stage_rows = [["stage", "median [ms]", "p95 [ms]"]]
     for name, times in result["stages"].items():
         stage_rows.append([name, f"{times['median_ms']:.2f}", f"{times['p95_ms']:.2f}"])
-    profile = Path(os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE", "none")).name
-    sent, received, median = result["transport"].values()
-    transport_rows = [
-        ["transport", "sent", "received", "median [ms]"],
-        [f"profile {profile}", str(sent), str(received), f"{median:.2f}"],
-    ]
-    return f"{columns(stage_rows)}\n\n{columns(transport_rows)}"
+    callback_rows = [["callback", "median [ms of a core]", "p95 [ms of a core]"]]
+    for name, times in result["callbacks"].items():
+        callback_rows.append([name, f"{times['median_ms']:.1f}", f"{times['p95_ms']:.1f}"])
+    transport_rows = [["transport", "sent", "received", "lost, by their numbers", "median [ms]"]]
+    for sender, found in result["transport"].items():
+        counts = (str(found[key]) for key in ("sent", "received", "lost"))
+        transport_rows.append([sender, *counts, f"{found['median_ms']:.2f}"])
+    return "\n\n".join(map(columns, (stage_rows, callback_rows, transport_rows)))
 
 
 def main() -> int:

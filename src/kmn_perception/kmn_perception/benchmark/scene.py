@@ -14,6 +14,7 @@ from kmn_perception.ros.messages import cloud_from_points
 WALL_DISTANCE = 1.0  # metres behind the object
 EXTENT = 20.0  # metres; floor and wall fill the view
 THICKNESS = 0.02  # metres
+PLACES = ((-0.3, -0.2), (0.3, -0.15), (-0.25, 0.25), (0.3, 0.3))  # of boxes, metres
 
 
 def full_cloud(model: KinematicModel) -> PointCloud2:
@@ -25,6 +26,16 @@ def full_cloud(model: KinematicModel) -> PointCloud2:
     cubes = np.concatenate((model.unit_cubes(*model.split(zero)), _floor_and_wall(model)))
     points = depth_to_points(render(cubes, model.camera), model.camera)
     return cloud_from_points(points, Header(frame_id="camera_optical_frame"))
+
+
+def boxes_on_a_table(model: KinematicModel) -> NDArray[np.float32]:
+    """Return the depth image of a box at each of ``PLACES``, turned and stretched unlike."""
+    cubes = [_floor_and_wall(model)[:1]]
+    for i, (x, y) in enumerate(PLACES):
+        values = {"x": x, "y": y, "yaw": 0.2 * i - 0.3, "x_scaling": 0.2 * i - 0.4}
+        theta = np.array([values.get(parameter.name, 0.0) for parameter in model.theta])
+        cubes.append(model.unit_cubes(theta, np.zeros(len(model.gamma))))
+    return render(np.concatenate(cubes), model.camera)
 
 
 def _floor_and_wall(model: KinematicModel) -> NDArray[np.float64]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import time
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -16,23 +19,32 @@ from tqdm import tqdm
 
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.message_gaps import MessageGaps
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.program import ros_session
 
 TOPIC = "benchmark/points"  # not `points`: nodes that run beside are left alone
-PERIOD = 0.1  # seconds
+PERIOD = 1.0 / 30.0  # seconds
+PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+SENDERS = ("with_our_profile", "foreign")  # one that was started without it
 DISCOVERY_TIMEOUT = 20.0  # seconds
 DISCOVERY_MARGIN = 0.5  # seconds for both sides to know each other
 FLUSH = 2.0  # seconds for the last clouds to arrive
 
 
-def measure(node: Node, settings: MorphNodeSettings, frames: int) -> dict[str, float]:
-    """Receive, as morph_node does, the clouds that another process publishes at 10 Hz.
+def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -> dict[str, float]:
+    """Receive, as morph_node does, the clouds that another process publishes at 30 Hz.
+
+    Parameters
+    ----------
+    sender
+        One of ``SENDERS``.
 
     Returns
     -------
     transport
-        ``sent`` and ``received`` clouds, and ``median_ms`` from before `publish` to the callback.
+        ``sent`` and ``received`` clouds, those ``lost`` between received ones by their numbers, and
+        ``median_ms`` from before `publish` to the callback.
 
     Raises
     ------
@@ -40,18 +52,21 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int) -> dict[str, f
         If the other process failed.
     """
     milliseconds: list[float] = []
-    with tqdm(total=frames, desc="transport", unit=" clouds", mininterval=1.0) as bar:
+    gaps = MessageGaps()
+    with tqdm(total=frames, desc=f"transport {sender}", unit=" clouds", mininterval=1.0) as bar:
 
-        def receive(cloud: PointCloud2) -> None:
+        def receive(cloud: PointCloud2, info: Mapping[str, Any]) -> None:
+            gaps.add(TOPIC, info)
             age = node.get_clock().now() - Time.from_msg(cloud.header.stamp)
             milliseconds.append(age.nanoseconds * 1e-6)
             bar.update()
 
         reliability = ReliabilityPolicy[settings.reliability.upper()]
         newest = QoSProfile(depth=1, reliability=reliability)
-        node.create_subscription(PointCloud2, TOPIC, receive, newest)
+        # rclpy calls with the message's info too, of which its annotations know nothing.
+        subscription = node.create_subscription(PointCloud2, TOPIC, receive, newest)  # type: ignore[arg-type]
         publisher = multiprocessing.get_context("spawn").Process(
-            target=publish, args=(settings.model, frames), daemon=True
+            target=publish, args=(settings.model, frames, sender), daemon=True
         )
         # The child inherits that it ignores Ctrl-C: this process ends both.
         on_interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -63,17 +78,21 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int) -> dict[str, f
         finally:
             publisher.kill()
             publisher.join()
+            node.destroy_subscription(subscription)
     if publisher.exitcode != 0:
         raise ChildProcessError(f"the publishing process ended with {publisher.exitcode}")
     return {
         "sent": frames,
         "received": len(milliseconds),
+        "lost": gaps.lost,
         "median_ms": float(np.median(milliseconds)) if milliseconds else float("nan"),
     }
 
 
-def publish(model: str, frames: int) -> None:
-    """Publish clouds at 10 Hz as soon as somebody listens; runs in a process of its own."""
+def publish(model: str, frames: int, sender: str) -> None:
+    """Publish clouds at 30 Hz as soon as somebody listens; runs in a process of its own."""
+    if sender == "foreign":
+        os.environ.pop(PROFILE, None)
     cloud = full_cloud(KinematicModel.load(model))
     with ros_session("benchmark"):
         _publish(Node("benchmark_publisher"), cloud, frames)

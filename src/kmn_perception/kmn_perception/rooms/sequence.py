@@ -18,7 +18,12 @@ from kmn_perception.rooms.settings import ImageSettings, RoomSettings
 
 
 def make_sequence(
-    seed: int, count: int, step: float = 0.0, sensor: str = "d455", kind: str = "door"
+    seed: int,
+    count: int,
+    step: float = 0.0,
+    sensor: str = "d455",
+    kind: str = "door",
+    camera: Camera | None = None,
 ) -> Iterator[Frame]:
     """Yield frames of the room of a seed, whose noise is fresh in each.
 
@@ -30,9 +35,11 @@ def make_sequence(
         Metres to the right that the camera moves from frame to frame; 0: it rests.
     sensor
         Name in ``config/sensors`` and ``config/cameras``.
+    camera
+        Another one than the sensor's, of other pixels.
     """
     settings, description = RoomSettings.load(), DepthSensor.load(sensor)
-    room = sample_room(seed, Camera.load(sensor), settings, kind)
+    room = sample_room(seed, camera or Camera.load(sensor), settings, kind)
     drawn = np.random.default_rng([seed, 2])
     offset = description.calibration.calibrated * float(drawn.standard_normal())
     bright = float(drawn.uniform(*settings.image.brightness))

@@ -16,6 +16,7 @@ from kmn_perception.ros.exposures import Exposures, Order
 from kmn_perception.ros.frame_statistics import FrameStatistics
 from kmn_perception.ros.image_transport import transported
 from kmn_perception.ros.mailbox import Mailbox
+from kmn_perception.ros.message_gaps import MessageGaps
 from kmn_perception.ros.messages import MessageError, view_from_cloud, view_from_image
 from kmn_perception.ros.messages.compressed import raw_depth
 from kmn_perception.ros.messages.reading import is_distorted
@@ -61,7 +62,7 @@ class FrameReceiver:
         self._settings, self._statistics, self._warnings = settings, statistics, warnings
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._exposures = Exposures()
-        self._sequence: dict[str, int] = {}
+        self._gaps = MessageGaps()
         self._early_image: tuple[Image | CompressedImage, float] | None = (
             None  # before any camera_info, and since
         )
@@ -83,12 +84,12 @@ class FrameReceiver:
         self._mailbox.close()
 
     def _on_points(self, cloud: PointCloud2, info: Mapping[str, Any]) -> None:
-        self._count_lost("points", info)
+        self._statistics.lose(self._gaps.add("points", info))
         self._submit("points", cloud.header, partial(read_cloud, cloud))
 
     def _on_image(self, image: Image | CompressedImage, info: Mapping[str, Any]) -> None:
         """Submit an image with the newest camera_info, or keep it until the first one comes."""
-        self._count_lost("depth/image", info)
+        self._statistics.lose(self._gaps.add("depth/image", info))
         if self.camera_info is not None:
             self._submit_image(image, self.camera_info)
             return
@@ -107,12 +108,6 @@ class FrameReceiver:
             return
         (image, _), self._early_image = self._early_image, None
         self._submit("depth/image", image.header, _refuse_without_info)
-
-    def _count_lost(self, topic: str, info: Mapping[str, Any]) -> None:
-        """Count the messages of a topic's publisher between this one and the one before."""
-        number = info["publication_sequence_number"]
-        self._statistics.lose(max(0, number - self._sequence.get(topic, number) - 1))
-        self._sequence[topic] = number
 
     def _submit_image(self, image: Image | CompressedImage, info: CameraInfo) -> None:
         if is_distorted(info) and self._settings().rectify:

@@ -11,6 +11,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from kmn_perception.ros.reports import make_status
 
 OK = "OK"  # the name of the status of what is as it should be
+MANY = 0.02  # share of the frames since the last report that are lost on their way
+REMEDY = (
+    "start the camera's process with FASTRTPS_DEFAULT_PROFILES_FILE set to "
+    "kmn_perception's config/fastdds.xml, or this node with reliability:=reliable"
+)
 
 
 class FrameStatistics:
@@ -23,6 +28,7 @@ class FrameStatistics:
         self._statuses: Counter[str] = Counter()
         self._used = self._objects = self._left_out = 0
         self._latencies: list[float] = []
+        self._reported = 0, 0  # received and lost at the last report
         self._last = "no frames received yet"
 
     def receive(self, replaced: bool) -> None:
@@ -102,7 +108,11 @@ class FrameStatistics:
                 "clock_jumps": str(self._clock_jumps),
                 "last": self._last,
             }
+            received, lost = self._received - self._reported[0], self._lost - self._reported[1]
+            self._reported = self._received, self._lost
             message = "no frames" if self._last == OK and not latencies else self._last
+            if lost > MANY * (received + lost):
+                message = f"{lost} of {received + lost} frames were lost on their way: {REMEDY}"
         return make_status(name, message != OK, message, values)
 
 

@@ -18,9 +18,10 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from kmn_perception.benchmark import arguments, benchmark
-from kmn_perception.benchmark.scene import WALL_DISTANCE, full_cloud
+from kmn_perception.benchmark.callbacks import CASES
+from kmn_perception.benchmark.scene import PLACES, WALL_DISTANCE, boxes_on_a_table, full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.model.rendering import render
+from kmn_perception.model.rendering import depth_to_cloud, render
 from kmn_perception.model.transformation import transform_points
 from kmn_perception.network import weights
 from kmn_perception.network.cascade import Cascade
@@ -65,6 +66,14 @@ def test_the_scene_shows_the_prototype_on_a_floor_before_a_wall(name: str) -> No
     assert on_floor.any()
 
 
+def test_every_box_on_the_table_stands_by_itself() -> None:
+    model = KinematicModel.load("box")
+    points = depth_to_cloud(boxes_on_a_table(model), model.camera)
+    for x, y in PLACES:
+        above = points[np.hypot(points[:, 0] - x, points[:, 1] - y) < 0.05, 2]
+        assert above.max() == pytest.approx(0.2, abs=1e-4)
+
+
 def test_the_result_holds_every_stage_and_the_transport(
     tmp_path: Path, environment: dict[str, str], parameters: list[str]
 ) -> None:
@@ -73,19 +82,22 @@ def test_the_result_holds_every_stage_and_the_transport(
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
     result = json.loads(out.read_text())
-    assert set(result) == {"stages", "transport"}
+    assert set(result) == {"stages", "callbacks", "transport"}
+    assert tuple(result["callbacks"]) == CASES
     assert list(result["stages"]) == [
         "message_to_view", "background_removal", "splat", "network", "predictions",
         "refinement", "refined_estimate", "callback",
     ]  # fmt: skip
-    for times in result["stages"].values():
+    for times in (*result["stages"].values(), *result["callbacks"].values()):
         assert set(times) == {"median_ms", "p95_ms"}
         assert 0.0 < times["median_ms"] <= times["p95_ms"]
-    assert set(result["transport"]) == {"sent", "received", "median_ms"}
-    assert result["transport"]["sent"] == FRAMES
-    assert 0 < result["transport"]["received"] <= FRAMES
-    assert result["transport"]["median_ms"] > 0.0
-    for row in (*result["stages"], "transport"):
+    assert list(result["transport"]) == ["with_our_profile", "foreign"]
+    for sender, transport in result["transport"].items():
+        assert set(transport) == {"sent", "received", "lost", "median_ms"}
+        assert transport["sent"] == FRAMES
+        assert transport["received"] + transport["lost"] <= FRAMES
+        assert sender == "foreign" or transport["received"] > 0
+    for row in (*result["stages"], *result["callbacks"], *result["transport"]):
         assert f"\n{row} " in ended.stdout
 
 

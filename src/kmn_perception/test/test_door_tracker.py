@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -15,6 +16,7 @@ from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.doors.door_estimate import DoorStatus
 from kmn_perception.doors.door_finder import DoorFinder, Sighting
 from kmn_perception.doors.door_tracker import DoorTracker
+from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.walls import Frame
 from kmn_perception.rooms import frame as rooms
 from kmn_perception.rooms.sequence import make_sequence
@@ -22,8 +24,13 @@ from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.pipeline_loading import load_pipeline
 
 SEED = 6100  # of a room whose door is in view
+SEARCHES = DoorSettings.load().tracking.searches
 SECOND = 10**9
-MOMENT = SECOND // 30
+
+
+def at(number: int) -> int:
+    """Return the stamp of a frame at 30 Hz, nanoseconds."""
+    return SECOND + number * SECOND // 30
 
 
 class CountingFinder(DoorFinder):
@@ -53,35 +60,48 @@ def as_seen(seen: rooms.Frame) -> Frame:
     return Frame(np.nan_to_num(seen.depth).astype(np.float32), grey, seen.room.camera)
 
 
-def test_every_frame_of_a_resting_camera_is_measured_and_one_is_searched(
+def test_every_frame_of_a_resting_camera_is_measured_and_few_are_searched(
     finder: CountingFinder,
 ) -> None:
-    tracker = DoorTracker(1)
-    found = [tracker.find(finder, f, None, SECOND + i * MOMENT) for i, f in enumerate(frames(4))]
-    assert finder.searches == 1
+    tracker, count = DoorTracker(1), SEARCHES + 3
+    found = [tracker.find(finder, f, None, at(i)) for i, f in enumerate(frames(count))]
+    assert finder.searches == SEARCHES
     assert {door.status for door in found} == {DoorStatus.OK}
     assert len({door.values.tobytes() for door in found}) == len(found)
-    for door, frame in zip(found, frames(4), strict=True):
+    for door, frame in zip(found[SEARCHES:], frames(count)[SEARCHES:], strict=True):
         searched = finder.find(frame)
         off = np.abs(door.values - searched.values)
         assert (off <= np.sqrt(np.diag(searched.covariance))).all()
 
 
 @pytest.mark.parametrize("later", [0, SECOND // 2, 3 * SECOND])
-def test_the_search_begins_anew_after_a_time_and_where_no_time_is_known(
+def test_the_search_is_made_anew_after_a_time_and_where_no_time_is_known(
     finder: CountingFinder, later: int
 ) -> None:
-    tracker, (first, second) = DoorTracker(1), frames(2)
-    tracker.find(finder, first, None, SECOND)
-    tracker.find(finder, second, None, later)
-    assert finder.searches == 2
+    tracker, seen = DoorTracker(1), frames(SEARCHES + 3)
+    for i, frame in enumerate(seen[:-1]):
+        tracker.find(finder, frame, None, at(i))
+    assert finder.searches == SEARCHES
+    tracker.find(finder, seen[-1], None, later)
+    assert finder.searches == SEARCHES + 1
+
+
+def test_searches_that_doubt_are_repeated(finder: CountingFinder) -> None:
+    tracker, seen = DoorTracker(1), frames(SEARCHES + 3)
+    sure = finder.settings
+    unsure = replace(sure, verdict=replace(sure.verdict, min_panel=1.0))  # no panel is so flat
+    for i, frame in enumerate(seen):
+        finder.settings = unsure if i == SEARCHES - 1 else sure
+        tracker.find(finder, frame, None, at(i))
+    assert finder.searches == len(seen)
 
 
 def test_a_camera_that_moves_searches(finder: CountingFinder) -> None:
     tracker = DoorTracker(1)
-    for i, frame in enumerate(frames(2, step=0.02)):
-        tracker.find(finder, frame, None, SECOND + i * MOMENT)
-    assert finder.searches == 2
+    seen = frames(SEARCHES + 1, step=0.02)
+    for i, frame in enumerate(seen):
+        tracker.find(finder, frame, None, at(i))
+    assert finder.searches == len(seen)
 
 
 def test_a_door_that_does_not_show_where_it_was_is_noticed(finder: CountingFinder) -> None:

@@ -29,6 +29,10 @@ def arguments(argv: list[str]) -> argparse.Namespace:
         "--frames", type=whole_number(1), default=100,
         help="times that each stage runs, and clouds through the topic (default 100)",
     )  # fmt: skip
+    parser.add_argument(
+        "--profile", choices=callbacks.CASES,
+        help="print only in which functions this callback spends its time",
+    )  # fmt: skip
     parser.add_argument("--json", type=output_file, help="file to write the result to")
     return parser.parse_args(argv)
 
@@ -78,6 +82,9 @@ def report(result: dict[str, Any]) -> str:
 def main() -> int:
     """Run the executable ``benchmark``."""
     options = arguments(own_arguments())
+    if options.profile:
+        print(callbacks.profile(options.profile, options.frames))
+        return 0
     with ros_session("benchmark"):
         result = benchmark(Node("benchmark"), options.frames)
         print(report(result))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import cProfile
+import io
+import pstats
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -33,6 +36,9 @@ from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.pipeline_loading import load_pipeline
 from kmn_perception.ros.stamps import stamp_of
 
+# A camera that rests before a door, at 30 Hz; the same frames, each by itself; larger ones; boxes.
+CASES = ("door", "door_searched", "door_1280x720", "boxes")
+SHOWN = 40  # functions
 ROOM = 6100  # seed of a room whose door is in view
 RATE = 30.0  # Hz
 DISTINCT = 4  # frames whose noise differs; they come again and again
@@ -50,29 +56,39 @@ class Seen(NamedTuple):
 
 
 def measure(repetitions: int) -> dict[str, dict[str, float]]:
-    """Return median and 95th percentile of the time that callbacks take of one core.
-
-    ``door`` is a camera at rest before a door at 30 Hz; ``door_searched`` the same frames, each by
-    itself.
-    """
-    doors = load_pipeline(MorphNodeSettings.check({**parameter_values("morph_node"), **DOOR}))
-    boxes = load_pipeline(MorphNodeSettings.check(parameter_values("morph_node", TABLETOP)))
-    small, large = (list(_door_frames(size)) for size in (None, LARGE))
-    on_table = [Seen(boxes_on_a_table(boxes.model), None, boxes.model.camera)]
-    cases: dict[str, Callable[[], list[float]]] = {
-        "door": lambda: _times(doors, small, repetitions, DoorTracker(1)),
-        "door_searched": lambda: _times(doors, small, repetitions, None),
-        "door_1280x720": lambda: _times(doors, large, repetitions, DoorTracker(1)),
-        "boxes": lambda: _times(boxes, on_table, repetitions, None),
-    }
+    """Return median and 95th percentile of the time that the ``CASES`` take of one core."""
     result = {}
-    for name, case in tqdm(cases.items(), "callbacks", unit=" cases", mininterval=1.0):
-        times = case()
+    cases = _cases(repetitions)
+    for name in tqdm(CASES, "callbacks", unit=" cases", mininterval=1.0):
+        times = cases[name]()
         result[name] = {
             "median_ms": float(np.median(times)),
             "p95_ms": float(np.percentile(times, 95)),
         }
     return result
+
+
+def profile(name: str, repetitions: int) -> str:
+    """Return in which functions one of the ``CASES`` spends its time, the costliest first."""
+    case, profiler = _cases(repetitions)[name], cProfile.Profile(time.thread_time)
+    case()  # the first time loads and compiles
+    profiler.runcall(case)
+    text = io.StringIO()
+    pstats.Stats(profiler, stream=text).strip_dirs().sort_stats("tottime").print_stats(SHOWN)
+    return text.getvalue()
+
+
+def _cases(repetitions: int) -> dict[str, Callable[[], list[float]]]:
+    doors = load_pipeline(MorphNodeSettings.check({**parameter_values("morph_node"), **DOOR}))
+    boxes = load_pipeline(MorphNodeSettings.check(parameter_values("morph_node", TABLETOP)))
+    small, large = (list(_door_frames(size)) for size in (None, LARGE))
+    on_table = [Seen(boxes_on_a_table(boxes.model), None, boxes.model.camera)]
+    return {
+        "door": lambda: _times(doors, small, repetitions, DoorTracker(1)),
+        "door_searched": lambda: _times(doors, small, repetitions, None),
+        "door_1280x720": lambda: _times(doors, large, repetitions, DoorTracker(1)),
+        "boxes": lambda: _times(boxes, on_table, repetitions, None),
+    }
 
 
 def _door_frames(size: tuple[int, int] | None) -> Iterator[Seen]:

@@ -11,7 +11,7 @@ import numpy as np
 from kmn_perception.doors.camera_check import doubt_upright
 from kmn_perception.doors.candidates import Candidate, find_candidates
 from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
-from kmn_perception.doors.fusion import agree
+from kmn_perception.doors.fusion import is_same_door
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.layout import SIDES
 from kmn_perception.doors.lines import Line, Pieces, cut_to_pieces, find_lines
@@ -120,9 +120,8 @@ class DoorFinder:
         if measurement is None:
             return None
         found = judge(measurement, settings)
-        as_before = found.status is last.estimate.status
-        as_before &= agree(found, last.estimate, settings.tracking.disagree)
-        return found if as_before else None
+        same = is_same_door(found, last.estimate, settings.tracking.disagree)
+        return found if same else None
 
     def _search(self, frame: Frame, walls: Walls) -> Sighting:
         """Return the best door of the walls."""

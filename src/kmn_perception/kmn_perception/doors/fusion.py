@@ -136,6 +136,12 @@ def agree(a: DoorEstimate, b: DoorEstimate, deviations: float) -> bool:
     return bool((np.abs(difference) <= allowed).all())
 
 
+def is_same_door(found: DoorEstimate, before: DoorEstimate, deviations: float) -> bool:
+    """Return whether a door is found, and is worth the same as the one that was found before."""
+    as_before = found.found and found.status is before.status
+    return as_before and agree(found, before, deviations)
+
+
 def fuse(estimates: Sequence[DoorEstimate], settings: FusionSettings) -> DoorEstimate:
     """Return the mean of estimates that agree; where enough know the handle, of those that do.
 

@@ -75,6 +75,8 @@ class TrackingSettings(NamedTuple):
 
     Attributes
     ----------
+    searches
+        That must agree in a row before only what they found is looked at.
     period
         After which everything is searched anew, seconds.
     beside
@@ -85,6 +87,7 @@ class TrackingSettings(NamedTuple):
         Joint standard deviations beyond which it is not the same door.
     """
 
+    searches: Count
     period: NonNegative
     beside: Positive
     reach: Positive

@@ -89,8 +89,8 @@ class _Seen(NamedTuple):
     noise: float
 
     def derivatives(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives (N, 12) of the inverse depths at values (12,)."""
-        rows = self.rows.copy()
+        """Return the derivatives (N, 12) of the inverse depths at values (12,), until the next."""
+        rows = self.rows  # not copied, since those of the tilt are set anew each time
         if isinstance(self.part, slice):
             rows[:, TILT] = -self.rays[:, 2:] * values[self.part]
         else:

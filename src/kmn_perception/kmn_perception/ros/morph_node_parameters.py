@@ -52,7 +52,7 @@ class MorphNodeSettings:
     image_delay
         By which an image's stamp may differ from that of the depth, seconds.
     fused_frames
-        How many frames of a door are fused at most; 1: each frame is estimated by itself.
+        How many frames of a door are fused at most; 1: each frame is measured by itself.
     estimator, pipeline
         Settings of the two.
     """

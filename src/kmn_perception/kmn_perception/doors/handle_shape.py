@@ -69,10 +69,10 @@ class _Shape(NamedTuple):
 class _Shapes(NamedTuple):
     """The cuboids of all shapes of a kind, see `_Box`: arrays (M, 2), and (M,) of the rest.
 
-    ``shape`` is the number of the shape, of ``count``, that a cuboid belongs to.
+    ``shape`` is the number of the shape, of ``number``, that a cuboid belongs to.
     """
 
-    count: int
+    number: int
     shape: NDArray[np.int64]
     before: NDArray[np.float64]
     along: NDArray[np.float64]
@@ -209,7 +209,7 @@ def _labels(
     nearest to the camera.
     """
     rows, columns = (round(x / pixel) for x in half)
-    labels = np.zeros((shapes.count, 2 * rows + 1, 2 * columns + 1), np.uint8)
+    labels = np.zeros((shapes.number, 2 * rows + 1, 2 * columns + 1), np.uint8)
     sign, distance, level = 1.0 if side == "right" else -1.0, frame.distance, at[1] - frame.height
     nearer = 1.0 - shapes.protrusion[:, None] / distance
     along = np.sort(at[0] * nearer + sign * shapes.along, axis=1)

@@ -55,11 +55,12 @@ class _Still:
         return np.asarray(blurred, np.float32)
 
     @cached_property
-    def _lines(self) -> list[tuple[NDArray[np.int64], NDArray[np.float32]]]:
+    def _lines(self) -> list[tuple[NDArray[np.intp], NDArray[np.float32]]]:
         """Pixels (N,) of upright and of level lines, and the slopes of grey there, 1/pixel."""
         found = []
         for right, down in ((1, 0), (0, 1)):
-            slope = np.asarray(cv2.Sobel(self._grey, cv2.CV_32F, right, down, scale=0.125)).ravel()
+            sobel = cv2.Sobel(self._grey, cv2.CV_32F, right, down, scale=0.125)
+            slope = np.asarray(sobel, np.float32).ravel()
             pixels = np.flatnonzero(np.abs(slope) > self._settings.slope)
             pixels = pixels[:: max(1, len(pixels) // _ENOUGH)]
             found.append((pixels, slope[pixels]))

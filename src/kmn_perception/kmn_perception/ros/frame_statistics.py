@@ -11,10 +11,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from kmn_perception.ros.reports import make_status
 
 OK = "OK"  # the name of the status of what is as it should be
-MANY = 0.02  # share of the frames since the last report that are lost on their way
+MANY = 0.1  # share of the frames since the last report that do not come in
 REMEDY = (
-    "start the camera's process with FASTRTPS_DEFAULT_PROFILES_FILE set to "
-    "kmn_perception's config/fastdds.xml, or this node with reliability:=reliable"
+    "unless this computer is too busy to take them, start the camera's process with "
+    "FASTRTPS_DEFAULT_PROFILES_FILE set to kmn_perception's config/fastdds.xml"
 )
 
 
@@ -112,7 +112,7 @@ class FrameStatistics:
             self._reported = self._received, self._lost
             message = "no frames" if self._last == OK and not latencies else self._last
             if lost > MANY * (received + lost):
-                message = f"{lost} of {received + lost} frames were lost on their way: {REMEDY}"
+                message = f"{lost} of {received + lost} frames did not come in: {REMEDY}"
         return make_status(name, message != OK, message, values)
 
 

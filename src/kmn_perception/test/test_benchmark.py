@@ -141,7 +141,7 @@ def test_ctrl_c_ends_both_processes_without_a_traceback(
     environment: dict[str, str], parameters: list[str]
 ) -> None:
     with subprocess.Popen(
-        [*COMMAND, "--frames", "20", *parameters],
+        [*COMMAND, "--frames", "8", *parameters],
         env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True,
     ) as process:  # fmt: skip
         assert process.stderr is not None

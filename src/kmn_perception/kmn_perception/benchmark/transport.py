@@ -53,7 +53,7 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -
     """
     milliseconds: list[float] = []
     gaps = MessageGaps()
-    with tqdm(total=frames, desc=f"transport {sender}", unit=" clouds", mininterval=1.0) as bar:
+    with tqdm(total=frames, desc=f"{sender} transport", unit=" clouds", mininterval=1.0) as bar:
 
         def receive(cloud: PointCloud2, info: Mapping[str, Any]) -> None:
             gaps.add(TOPIC, info)

@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import Section
+from kmn_perception.configuration.section import Section, is_number
 
 TYPES = {"bool": bool, "int": int, "double": float, "string": str, "double_array": list}
 BOUNDS, ONE_OF, FIXED_SIZE, NOT_EMPTY = "bounds<>", "one_of<>", "fixed_size<>", "not_empty<>"
@@ -76,14 +76,17 @@ class NodeParameter(NamedTuple):
         return self.description + " Only at the start." * self.read_only
 
     def check(self, value: Any) -> None:
-        """Raise a `ParameterError` if a value of the right type is not valid."""
+        """Raise a `ParameterError` if a value is not valid."""
         expected = ""
-        if self.choices and value not in self.choices:
+        kind = TYPES[self.type]
+        if type(value) is not kind and (kind, type(value)) != (float, int):
+            expected = f"of type {self.type}"
+        elif self.choices and value not in self.choices:
             expected = f"one of {', '.join(self.choices)}"
         elif self.bounds and not self.bounds[0] <= value <= self.bounds[1]:
             expected = f"within {self.range}"
         elif self.type == "double_array" and not (
-            self.size in (None, len(value)) and all(map(math.isfinite, value))
+            self.size in (None, len(value)) and all(map(is_number, value))
         ):
             expected = f"{self.size or 'some'} finite numbers"
         elif self.not_empty and not value:
@@ -128,7 +131,10 @@ def parameter_values(node: str, *files: str) -> dict[str, Any]:
         given = section.section("ros__parameters")
         given.allow((), parameters)
         values.update(given.values)
-    check_values(node, values)
+        try:
+            check_values(node, values)
+        except ParameterError as error:
+            raise ParameterError(f"{given.place}: {error}") from error
     return values
 
 

@@ -1,13 +1,13 @@
-"""Reading of YAML files, with errors that name the file and the key."""
+"""Reading of YAML and JSON files, with errors that name the file and the key."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
-import yaml
+from kmn_perception.configuration.plain_text import parse_json, parse_yaml
 
 
 class ConfigurationError(ValueError):
@@ -15,7 +15,7 @@ class ConfigurationError(ValueError):
 
 
 class Section:
-    """A mapping of a YAML file that knows its place, for errors that name the key.
+    """A mapping of a YAML or JSON file that knows its place, for errors that name the key.
 
     Parameters
     ----------
@@ -34,10 +34,12 @@ class Section:
     @classmethod
     def load(cls, path: Path) -> Section:
         """Read a YAML file."""
-        try:
-            return cls(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise ConfigurationError(f"{path.name}: not YAML: {error}") from error
+        return cls(_read(path, parse_yaml), path.name)
+
+    @classmethod
+    def load_json(cls, path: Path) -> Section:
+        """Read a JSON file."""
+        return cls(_read(path, parse_json), path.name)
 
     def allow(self, required: Collection[str], optional: Collection[str] = ()) -> None:
         """Raise if a required key is missing or a key is unknown."""
@@ -132,6 +134,14 @@ class Section:
         if low >= high:
             raise self.error(f"'{key}' are reversed: lower {low:g} is not below upper {high:g}")
         return low, high
+
+
+def _read(path: Path, parse: Callable[[str], Any]) -> Any:
+    """Return what a file says; raise `ConfigurationError` if it says nothing sensible."""
+    try:
+        return parse(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ConfigurationError(f"{path.name}: {error}") from error
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

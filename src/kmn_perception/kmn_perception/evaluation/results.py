@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shlex
 import sys
@@ -15,6 +14,7 @@ import numpy as np
 
 from kmn_perception.command_line.arguments import output_folder, whole_number, write_json
 from kmn_perception.configuration.output import replacing
+from kmn_perception.configuration.plain_text import parse_json
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.comparison import LIMIT, Comparison, Request
 from kmn_perception.evaluation.evaluate import command, configuration_hash, experiment
@@ -81,7 +81,7 @@ def result_of(
 def _read(file: Path) -> dict[str, Any]:
     """Return what an evaluation wrote; nothing if that is damaged."""
     try:
-        result = json.loads(file.read_text(encoding="utf-8"))
+        result = parse_json(file.read_bytes())
     except ValueError:
         result = None
     return result if isinstance(result, dict) else {}

@@ -60,6 +60,14 @@ class Camera:
         pose = section.section("pose")
         pose.allow(("position", "look_at"))
         near = section.number("near", 0.0, 1e3)
+        position, target = pose.numbers("position", 3), pose.numbers("look_at", 3)
+        with np.errstate(all="ignore"):
+            placed = look_at(position, target)
+        if not np.isfinite(placed).all():
+            raise pose.error(
+                f"'look_at' {target} must neither be at 'position' {position} nor straight above or "
+                "below it: upright there is none"
+            )
         return cls(
             width=section.whole_number("width", 1, 16384),
             height=section.whole_number("height", 1, 16384),
@@ -67,7 +75,7 @@ class Camera:
             fy=section.number("fy", 1e-3, 1e6),
             cx=section.number("cx"),
             cy=section.number("cy"),
-            pose=look_at(pose.numbers("position", 3), pose.numbers("look_at", 3)),
+            pose=placed,
             near=near,
             far=section.number("far", near, 1e4),
         )

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.output import replacing
+from kmn_perception.configuration.plain_text import parse_json
 
 FORMAT = "kmn-weights-3"
 
@@ -54,7 +55,7 @@ def read(name_or_path: str | Path) -> WeightFile:
         raise WeightsError(f"no weights: {error}") from error
     try:
         with safe_open(str(path), framework="pt") as file:
-            metadata = {key: json.loads(text) for key, text in (file.metadata() or {}).items()}
+            metadata = {key: parse_json(text) for key, text in (file.metadata() or {}).items()}
             tensors = {key: file.get_tensor(key) for key in file.keys()}
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(f"{path.name} is not a readable safetensors file: {error}") from error

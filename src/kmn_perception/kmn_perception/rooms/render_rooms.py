@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -15,6 +14,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kmn_perception.command_line.arguments import output_folder, whole_number, write_json
+from kmn_perception.configuration.section import Section
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.rooms.frame import CALIBRATIONS, Frame, make_frame
 from kmn_perception.rooms.label import label
@@ -72,7 +72,9 @@ def missing(options: argparse.Namespace) -> list[int]:
         file = options.out / f"{options.kind}_{seed}.json"  # is written last
         if not file.is_file():
             seeds.append(seed)
-        elif not _source(options, seed).items() <= json.loads(file.read_text())["source"].items():
+            continue
+        there = Section.load_json(file).section("source").values
+        if not _source(options, seed).items() <= there.items():
             raise ValueError(f"{file} is of a room rendered with other options; use another --out")
     return seeds
 

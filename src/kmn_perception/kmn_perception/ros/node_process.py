@@ -47,6 +47,19 @@ class NodeProcess:
         with self._log.open("ab") as output:
             self._process = subprocess.Popen(self._command, stdout=output, stderr=output)
 
+    @property
+    def pid(self) -> int:
+        """Of the process that was started last."""
+        return self._process.pid
+
+    def is_running(self) -> bool:
+        """Tell whether it has not ended."""
+        return self._process.poll() is None
+
+    def output(self) -> str:
+        """Return all that it has printed."""
+        return self._log.read_text(errors="replace")
+
     def kill(self) -> None:
         """End it without a chance to tidy up, as ``kill -9``."""
         self._process.kill()
@@ -62,8 +75,8 @@ class NodeProcess:
 
     def check(self) -> None:
         """Raise a `ProcessError` with the end of its output if the process has ended."""
-        if self._process.poll() is not None:
-            last = "\n".join(self._log.read_text(errors="replace").splitlines()[-LOG_LINES:])
+        if not self.is_running():
+            last = "\n".join(self.output().splitlines()[-LOG_LINES:])
             raise ProcessError(
                 f"{self._executable} ended with exit code {self._process.returncode}:\n{last}"
             )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
+from kmn_perception.configuration.plain_text import parse_yaml
 
 FILE_ARGUMENT = "--params-file"
 PARAMETERS = "ros__parameters"
@@ -27,10 +27,10 @@ def useless_files(name: str, arguments: Sequence[str]) -> list[str]:
     for argument, file in zip(arguments, arguments[1:], strict=False):
         if argument == FILE_ARGUMENT and Path(file).is_file():
             try:
-                tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
-            except (OSError, ValueError, yaml.YAMLError):
+                tree = parse_yaml(Path(file).read_text(encoding="utf-8"))
+            except (OSError, ValueError):
                 continue
-            names = list(_names(tree or {}))
+            names = list(_names(tree)) if isinstance(tree, Mapping) else []
             if not any(_matches(pattern, name) for pattern in names):
                 held = ", ".join(names) or "no node"
                 texts.append(f"{file} holds no parameters for {name}, but for {held}")

@@ -62,7 +62,7 @@ def ros_session(name: str) -> Iterator[None]:
     """
     signal.signal(signal.SIGTERM, _exit)
     try:
-        _init(split_arguments(sys.argv[1:])[1])
+        initialise(split_arguments(sys.argv[1:])[1])
         yield
     except EXPECTED as error:
         print(f"{name}: {error}", file=sys.stderr)
@@ -75,7 +75,7 @@ def _exit(number: int, frame: FrameType | None) -> None:
     sys.exit(128 + number)
 
 
-def _init(arguments: list[str]) -> None:
+def initialise(arguments: list[str]) -> None:
     """Begin to communicate, as the arguments of ROS have it, among them the parameter files.
 
     Raises

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from kmn_perception.configuration.plain_text import parse_json
 from kmn_perception.sharing.plain import from_plain, to_plain
 
 FORMAT = 1
@@ -181,14 +182,14 @@ def _line(value: Heading | Record) -> bytes:
 
 def _heading(file: Path, line: bytes) -> Heading:
     try:
-        return from_plain(Heading, json.loads(line))
+        return from_plain(Heading, parse_json(line))
     except ValueError as error:
         raise RecordsError(f"{file} is no file of records ({error})") from error
 
 
 def _record(file: Path, number: int, line: bytes) -> Record:
     try:
-        return from_plain(Record, json.loads(line))
+        return from_plain(Record, parse_json(line))
     except ValueError as error:
         raise _damaged(file, number, str(error)) from error
 

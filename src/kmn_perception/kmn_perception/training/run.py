@@ -88,7 +88,7 @@ class Run:
             return None
         try:
             checkpoint: dict[str, Any] = torch.load(file, map_location=device, weights_only=True)
-        except (EOFError, OSError, RuntimeError, UnpicklingError) as error:
+        except (EOFError, OSError, RuntimeError, UnpicklingError, ValueError) as error:
             raise RunError(
                 f"{file} is damaged ({_first_line(error)}); "
                 "use --restart to train from the beginning"

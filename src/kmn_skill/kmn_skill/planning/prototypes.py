@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration import resources
-from kmn_perception.configuration.section import ConfigurationError
+from kmn_perception.configuration.output import replacing
+from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_skill.planning.layout import BASE_AND_ARM, ROBOT
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.robot import default_robot
@@ -75,6 +76,8 @@ class Prototypes:
         ------
         FileNotFoundError
             If they have not been made.
+        ConfigurationError
+            If the file does not hold any.
         """
         name = Path(robot or default_robot())
         file: str | Path = name.with_suffix("") / f"{motions}.json"
@@ -86,12 +89,15 @@ class Prototypes:
             found = resources.find("config/skill/prototypes", file, ".json")
         except FileNotFoundError as error:
             raise FileNotFoundError(f"{error}: make_prototypes makes a robot's motions") from error
-        stored = json.loads(found.read_text(encoding="utf-8"))
+        stored = Section.load_json(found)
+        stored.allow(("joints",), SOLUTIONS)
+        joints = stored.values["joints"]
+        if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
+            raise stored.error(f"'joints' must be names, found {joints!r}")
         solutions = {
-            name: [Solution(*map(np.array, solution)) for solution in stored.get(name, ())]
-            for name in SOLUTIONS
+            name: _read(stored, name, len(joints)) if name in stored else [] for name in SOLUTIONS
         }
-        return cls(tuple(stored["joints"]), solutions)
+        return cls(tuple(joints), solutions)
 
     def save(self, file: Path) -> None:
         """Write the file that `load` reads."""
@@ -99,7 +105,9 @@ class Prototypes:
             name: [[gamma.tolist(), path.round(5).tolist()] for gamma, path in solutions]
             for name, solutions in self.solutions.items()
         }
-        file.write_text(json.dumps({"joints": self.joints, **stored}) + "\n", encoding="utf-8")
+        text = json.dumps({"joints": self.joints, **stored})
+        with replacing(file) as new:
+            new.write_text(text + "\n", encoding="utf-8")
 
     def check(self, joints: Sequence[str]) -> None:
         """Raise `ConfigurationError` if they are not for these joints of robot and object."""
@@ -138,6 +146,24 @@ class Prototypes:
             moving = varied[1:, ROBOT][:, BASE_AND_ARM]
             moving += generator.normal(0.0, spread, moving.shape[1])
             yield Guess(f"{name}, varied {number}", Solution(gamma, varied))
+
+
+def _read(stored: Section, name: str, columns: int) -> list[Solution]:
+    """Return the solutions of a name, whose paths have so many columns."""
+    found = []
+    try:
+        for gamma, path in stored.values[name]:
+            solution = Solution(np.array(gamma, np.float64), np.array(path, np.float64))
+            if solution.gamma.ndim != 1 or solution.path.shape[1:] != (columns,):
+                raise ValueError("their shapes are wrong")
+            if not all(np.isfinite(part).all() for part in solution):
+                raise ValueError("not all numbers are finite")
+            found.append(solution)
+    except (TypeError, ValueError) as error:
+        raise stored.error(
+            f"'{name}' must be pairs of gamma and a path of {columns} columns: {error}"
+        ) from error
+    return found
 
 
 def direction(target: float) -> str:

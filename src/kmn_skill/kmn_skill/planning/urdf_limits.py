@@ -31,15 +31,26 @@ def limits_of_urdf(text: str) -> dict[str, JointLimits]:
     found = {}
     for joint in robot.iterfind("joint"):
         limit = joint.find("limit")
-        values = {} if limit is None else limit.attrib
         free = limit is None or joint.get("type") == "continuous"
         if joint.get("type") != "fixed":
             found[joint.get("name", "")] = JointLimits(
-                -math.inf if free else float(values.get("lower", 0.0)),
-                math.inf if free else float(values.get("upper", 0.0)),
-                float(values.get("velocity", math.inf)),
+                -math.inf if free else _number(joint, "lower", 0.0),
+                math.inf if free else _number(joint, "upper", 0.0),
+                _number(joint, "velocity", math.inf),
             )
     return found
+
+
+def _number(joint: ElementTree.Element, key: str, default: float) -> float:
+    limit = joint.find("limit")
+    text = None if limit is None else limit.get(key)
+    try:
+        number = default if text is None else float(text)
+    except ValueError:
+        number = math.nan
+    if math.isnan(number):
+        raise ValueError(f"it limits the {key} of joint {joint.get('name')} by what is no number: '{text}'")
+    return number
 
 
 def differences(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -135,11 +134,7 @@ def read_description(file: Path) -> FrameDescription:
     OSError
         If it cannot be read.
     """
-    try:
-        values = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise Section({}, file.name).error(f"not JSON: {error}") from error
-    return describe(Section(values, file.name))
+    return describe(Section.load_json(file))
 
 
 def describe(section: Section) -> FrameDescription:

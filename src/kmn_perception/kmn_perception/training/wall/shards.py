@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from functools import partial
@@ -141,14 +140,17 @@ def _read(file: Path, made_with: str) -> Iterator[tuple[int, Sample]]:
             ends = np.cumsum(arrays["columns"])
             cells = np.split(arrays["cells"], ends[:-1], axis=2) if len(ends) else []
             targets, rooms, other = arrays["targets"], arrays["rooms"], str(arrays["made_with"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            samples = [
+                (int(room), Sample(part, Target(*map(float, target))))
+                for room, part, target in zip(rooms, cells, targets, strict=True)
+            ]
+    except Exception as error:  # numpy, zipfile and zlib raise errors of all kinds
         raise RunError(
             f"{file} is damaged ({error}); remove it to render its rooms anew"
         ) from error
     if other != made_with:
         raise RunError(f"{file} was made with other settings; remove it to render its rooms anew")
-    for room, part, target in zip(rooms, cells, targets, strict=True):
-        yield int(room), Sample(part, Target(*map(float, target)))
+    yield from samples
 
 
 def _renderer(settings: WallTrainingSettings, doors: DoorSettings) -> Callable[[int], list[Sample]]:

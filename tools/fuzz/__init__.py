@@ -1,0 +1,1 @@
+"""Hostile files and messages for everything that the project reads: ``make fuzz``."""

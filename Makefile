@@ -48,6 +48,17 @@ demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all bo
 evaluate: build  ## regenerate docs/results, table and figures (half an hour; interrupted, it goes on)
 	@./run kmn_perception results --samples 2000 --seed 0 --out docs/results
 
+N := 10000
+HOURS := 8
+
+.PHONY: fuzz soak
+fuzz: build $(READY)training $(READY)simulation $(READY)viewer  ## hostile files and messages for all that reads them (N=10000 of each SEED=0)
+	@. tools/environment.sh $(ROS) && . install/setup.bash && PYTHONPATH="tools:$$PYTHONPATH" .venv/bin/python -m fuzz \
+	    --cases $(N) --seed $(SEED)
+
+soak: build $(READY)simulation $(READY)viewer  ## open doors while nodes die, floods come, clocks jump and disks are full (HOURS=8 SEED=0)
+	@./run kmn_skill soak --hours $(HOURS) --seed $(SEED)
+
 # Tests of one file run one after the other, files side by side; each with one thread of its own.
 .PHONY: test test-all
 test: SELECTED := -m "not slow"

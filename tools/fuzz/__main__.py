@@ -9,11 +9,11 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from tqdm import tqdm
+
 from fuzz import talks, trials
 from fuzz.files import kinds
 from fuzz.outcome import VERDICTS, Fault, Outcome
-from tqdm import tqdm
-
 from kmn_perception.command_line.arguments import output_folder, whole_number
 from kmn_perception.command_line.columns import columns
 from kmn_perception.ros.program import own_arguments, ros_session
@@ -51,7 +51,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
     rows = [["kind", "cases", *VERDICTS, "faults"]]
     total: Counter[str] = Counter()
     for kind, cases, counts, faults in outcomes:
-        numbers = Counter(counts, cases=cases, faults=len(faults))
+        numbers = counts + Counter(cases=cases, faults=len(faults))
         total += numbers
         rows.append([kind, *(str(numbers[name]) for name in rows[0][1:])])
     return columns([*rows, ["all", *(str(total[name]) for name in rows[0][1:])]])

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import torch
-from fuzz import mutations
-from fuzz.mutations import Mutation
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 
+from fuzz import mutations
+from fuzz.mutations import Mutation
 from kmn_perception.bags.rosbag2 import Message, read_messages, read_topics, write_bag
 from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.configuration.resources import share_directory
@@ -34,13 +34,13 @@ from kmn_perception.model.depth_sensor import DepthSensor
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.room_model import RoomModel
 from kmn_perception.network import wall_weights, weights
+from kmn_perception.rooms.frame import make_frame
+from kmn_perception.rooms.render_rooms import write as write_room
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.parameter_files import useless_files
 from kmn_perception.ros.parameters import declare_parameters
 from kmn_perception.ros.program import initialise
 from kmn_perception.sharing.records import WHOLE, Heading, Record, read_records, write_line
-from kmn_perception.rooms.frame import make_frame
-from kmn_perception.rooms.render_rooms import write as write_room
 from kmn_perception.training.procedures import load_training_settings
 from kmn_perception.training.run import Run
 from kmn_perception.training.wall.settings import WallTrainingSettings
@@ -205,7 +205,9 @@ def _bags(folder: Path) -> Iterator[Kind]:
     yield Kind("bag, sqlite3", _files(folder, "sqlite3/*.db3"), change, read)
     metadata = folder / "metadata.yaml"
     shutil.copy(folder / "mcap/metadata.yaml", metadata)
-    yield Kind("bag, metadata", [metadata], mutations.change_yaml, read_whole, (str(folder / "mcap"),))
+    yield Kind(
+        "bag, metadata", [metadata], mutations.change_yaml, read_whole, (str(folder / "mcap"),)
+    )
 
 
 def _pictures(folder: Path, share: Path, change: Mutation) -> Iterator[Kind]:
@@ -214,6 +216,7 @@ def _pictures(folder: Path, share: Path, change: Mutation) -> Iterator[Kind]:
     yield Kind("depth image", _files(boxes, "*_d.png"), change, read_depth_image)
     labels = _files(boxes, "*_l.png")
     yield Kind("labels of boxes", labels, change, lambda file: read_picture(file, np.uint8))
+    source: dict[str, Any]
     source = {"seed": 0, "sensor": "d455", "calibration": "calibrated", "kind": "door"}
     folder.mkdir()
     write_room(folder, "door_0", make_frame(**source), source)
@@ -240,7 +243,9 @@ def _descriptions(folder: Path) -> Iterator[Kind]:
 
     change = mutations.change_xml
     yield Kind("URDF, drawn", [urdf], change, read_drawn, ("robot_description",))
-    yield Kind("URDF, its limits", [urdf], change, lambda file: limits_of_urdf(_text(file)), ("it ",))
+    yield Kind(
+        "URDF, its limits", [urdf], change, lambda file: limits_of_urdf(_text(file)), ("it ",)
+    )
 
 
 def _text(file: Path) -> str:
@@ -261,7 +266,11 @@ def _training_runs(folder: Path) -> Iterator[Kind]:
 
     change = mutations.change_bytes
     yield Kind("checkpoint", [checkpoint], change, resume, ("checkpoint.pt",))
-    shard, rooms, doors = folder / "shard.npz", WallTrainingSettings.load("room_door"), DoorSettings.load()
+    shard, rooms, doors = (
+        folder / "shard.npz",
+        WallTrainingSettings.load("room_door"),
+        DoorSettings.load(),
+    )
     np.savez_compressed(
         shard,
         cells=np.zeros((3, 8, 20), np.int8),

@@ -11,8 +11,9 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from fuzz.mutations import MAX_CHANGES, TEXTS, change_bytes
 from rclpy.serialization import serialize_message
+
+from fuzz.mutations import MAX_CHANGES, TEXTS, change_bytes
 
 FLOATS = (0.0, -0.0, -1.0, 1e-30, 3e38, float("nan"), float("inf"), -float("inf"))
 MANY = 1000  # elements

@@ -21,8 +21,29 @@ NUMBERS: tuple[Any, ...] = (
     *(0.0, -0.0, 0.5, -1e-9, 1e-320, 1e38, 1e308, -1e308),
     *(float("nan"), float("inf"), -float("inf")),
 )
-TEXTS = ("", " ", "nan", "inf", "x", "../../../etc/passwd", "\u202e\U0001f4a3", "long " * 2000, "%s{0}")
-OTHERS: tuple[Any, ...] = (None, True, False, [], {}, [[]], [None], [float("nan")] * 3, [0.0] * 3, [0] * 1000)
+TEXTS = (
+    "",
+    " ",
+    "nan",
+    "inf",
+    "x",
+    "../../../etc/passwd",
+    "\u202e\U0001f4a3",
+    "long " * 2000,
+    "%s{0}",
+)
+OTHERS: tuple[Any, ...] = (
+    None,
+    True,
+    False,
+    [],
+    {},
+    [[]],
+    [None],
+    [float("nan")] * 3,
+    [0.0] * 3,
+    [0] * 1000,
+)
 
 # Texts in place of a value, or of the whole file.
 YAML_BOMBS = (
@@ -43,7 +64,18 @@ YAML_BOMBS = (
     "1:30:00", "9" * 5000, "0x" + "f" * 5000, "1e999", ".nan", "*unknown", "? [a, b]\n: c",
     "<<: 3", "!unknown 3", "\"\\x00\"", "---\na: 1\n---\nb: 2", "%YAML 9.9", "\t- x",
 )  # fmt: skip
-JSON_BOMBS = ("[" * DEEP, '{"a":' * DEEP, "9" * 5000, "1e999", "NaN", "-Infinity", '"\\ud800"', "null", "[]", "3")
+JSON_BOMBS = (
+    "[" * DEEP,
+    '{"a":' * DEEP,
+    "9" * 5000,
+    "1e999",
+    "NaN",
+    "-Infinity",
+    '"\\ud800"',
+    "null",
+    "[]",
+    "3",
+)
 XML_BOMBS = (
     "<a>" * DEEP,
     '<!DOCTYPE r [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 10 + '"><!ENTITY c "' + "&b;" * 10

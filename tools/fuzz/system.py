@@ -15,12 +15,10 @@ from random import Random
 from typing import Any, NamedTuple
 
 from control_msgs.action import FollowJointTrajectory
-from fuzz.messages import hostile_message, hostile_values, interface
-from fuzz.outcome import ACCEPTED, ANSWERED, REFUSED, SENT
 from rcl_interfaces.msg import Parameter
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.action import ActionClient
+from rclpy.action.client import ActionClient
 from rclpy.action.graph import get_action_server_names_and_types_by_node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
@@ -28,8 +26,10 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from fuzz.messages import hostile_message, hostile_values, interface
+from fuzz.outcome import ACCEPTED, ANSWERED, REFUSED, SENT
 from kmn_perception.configuration.node_parameters import load_node_parameters
-from kmn_perception.ros.node_process import NoAnswerError, ProcessError
+from kmn_perception.ros.node_process import NoAnswerError
 from kmn_skill.experiments.door_system import DoorSystem
 from kmn_skill.experiments.settings import Experiment
 from kmn_skill.planning.robot import default_robot
@@ -56,7 +56,8 @@ class Entrance(NamedTuple):
     type: str
 
     def __str__(self) -> str:
-        return f"{self.node}: {self.name.rpartition(self.node)[2].lstrip('/') or self.name}"
+        _, *relative = self.name.lstrip("/").split("/")  # without the namespace
+        return f"{self.node}: {'/'.join(relative) or self.name}"
 
 
 def line(to: Entrance, content: Any) -> str:
@@ -111,7 +112,7 @@ class FuzzedSystem(DoorSystem):
         for topic, type_ in topics.items():
             keep = lambda message, topic=topic: self._valid.setdefault(topic, message)  # noqa: E731
             heard.append(node.create_subscription(interface(type_), topic, keep, quick))
-        self._pause(CAPTURE)
+        self._client.pause(CAPTURE)
         for subscription in heard:
             node.destroy_subscription(subscription)
         for name in self._processes:
@@ -139,8 +140,12 @@ class FuzzedSystem(DoorSystem):
             return SENT
         if to.kind == ACTION:
             return self.pursue(to, content)
-        self._call(to.name, interface(to.type), content)
-        return ANSWERED
+        if not to.type.startswith("rcl_interfaces/"):
+            self._call(to.name, interface(to.type), content)
+            return ANSWERED
+        answer = self._request(to.name, interface(to.type), content)
+        self.probe(to.node)  # is answered later
+        return ANSWERED if answer.done() else REFUSED  # by rclpy, which then says nothing
 
     def deliver_line(self, text: str, entrances: Sequence[Entrance]) -> None:
         """Send what `line` returned, to a system with another namespace."""
@@ -152,7 +157,9 @@ class FuzzedSystem(DoorSystem):
             self.publish(to, content)
         else:
             cls = interface(to.type)
-            self.deliver(to, deserialize_message(content, cls.Goal if to.kind == ACTION else cls.Request))
+            self.deliver(
+                to, deserialize_message(content, cls.Goal if to.kind == ACTION else cls.Request)
+            )
 
     def publish(self, to: Entrance, message: Any) -> None:
         """Publish a message, or bytes of one."""
@@ -162,7 +169,9 @@ class FuzzedSystem(DoorSystem):
 
     def pursue(self, to: Entrance, goal: Any) -> str:
         """Send a goal and cancel it; return whether it was accepted."""
-        client = self._client_of(to.name, lambda: ActionClient(self._node, interface(to.type), to.name))
+        client = self._client_of(
+            to.name, lambda: ActionClient(self._node, interface(to.type), to.name)
+        )
         self._wait(client.server_is_ready, to.node)
         handle = self._result(client.send_goal_async(goal), to.node)
         if not handle.accepted:
@@ -259,9 +268,12 @@ class FuzzedSystem(DoorSystem):
         return self._clients[name]
 
     def _call(self, name: str, kind: Any, request: Any) -> Any:
+        return self._result(self._request(name, kind, request), name)
+
+    def _request(self, name: str, kind: Any, request: Any) -> Future:
         client = self._client_of(name, lambda: self._node.create_client(kind, name))
         self._wait(client.service_is_ready, name)
-        return self._result(client.call_async(request), name)
+        return client.call_async(request)
 
     def _result(self, future: Future, whom: str) -> Any:
         self._wait(future.done, whom)
@@ -269,7 +281,3 @@ class FuzzedSystem(DoorSystem):
 
     def _wait(self, find: Any, whom: str) -> Any:
         return self._client.wait(find, ANSWER, whom)
-
-    def _pause(self, seconds: float) -> None:
-        with suppress(NoAnswerError):
-            self._client.wait(lambda: None, seconds, "nobody")

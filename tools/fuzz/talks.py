@@ -6,10 +6,10 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
-from fuzz.outcome import Fault, Outcome
-from fuzz.system import SERVICE, Entrance, FuzzedSystem, line
 from tqdm import tqdm
 
+from fuzz.outcome import Fault, Outcome
+from fuzz.system import SERVICE, Entrance, FuzzedSystem, line
 from kmn_perception.ros.node_process import ProcessError
 from kmn_skill.experiments.settings import Experiment
 
@@ -20,7 +20,7 @@ TRACEBACK = "Traceback"
 
 
 def run(cases: int, seed: int, kept: Path) -> list[Outcome]:
-    """Send so many to the nodes, evenly to all that they take; keep what makes faults in a folder."""
+    """Send so many to all that the nodes take, evenly; keep what makes faults in a folder."""
     with FuzzedSystem(Experiment.load(), seed) as system:
         entrances = system.entrances()
         system.learn(entrances)

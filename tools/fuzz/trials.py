@@ -13,11 +13,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from random import Random
 
+from rclpy.exceptions import ParameterException
+
 from fuzz.files import Kind
 from fuzz.mutations import CANARY
 from fuzz.outcome import ACCEPTED, REFUSED, Fault, Outcome
-from rclpy.exceptions import ParameterException
-
 from kmn_perception.ros.program import EXPECTED
 
 TIMEOUT = 30.0  # seconds for a file; a busy machine needs some
@@ -67,9 +67,7 @@ def run(kind: Kind, seed: int, cases: list[int], folder: Path, kept: Path) -> Ou
     return Outcome(kind.name, len(cases), counts, faults)
 
 
-def _follow(
-    here: Connection, left: list[int], counts: Counter[str], found: dict[int, str]
-) -> str:
+def _follow(here: Connection, left: list[int], counts: Counter[str], found: dict[int, str]) -> str:
     """Take results until all are there, or the process dies or hangs."""
     while left:
         if not here.poll(TIMEOUT):

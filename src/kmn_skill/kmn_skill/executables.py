@@ -8,6 +8,7 @@ EXECUTABLES = {
     "evaluate": ("kmn_skill.experiments.evaluate", "simulation"),
     "kill_nodes": ("kmn_skill.experiments.kill_nodes", "simulation"),
     "demo": ("kmn_skill.experiments.demo", "simulation"),
+    "soak": ("kmn_skill.experiments.soak.soak", "simulation"),
     "merge": ("kmn_skill.experiments.merge", "simulation"),
     "plan_doors": ("kmn_skill.experiments.plan_doors", "simulation"),
     "make_prototypes": ("kmn_skill.experiments.make_prototypes", "simulation"),

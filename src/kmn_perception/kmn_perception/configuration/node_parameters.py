@@ -6,7 +6,6 @@ validations below are known here.
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Mapping
 from dataclasses import fields

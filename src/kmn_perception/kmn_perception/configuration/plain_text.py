@@ -23,7 +23,7 @@ def parse_yaml(text: str) -> Any:
     """
     try:
         tree = yaml.safe_load(text)
-    except Exception as error:  # of dates, numbers, keys and depth PyYAML raises errors of all kinds
+    except Exception as error:  # PyYAML raises errors of all kinds
         raise ValueError(f"not YAML: {error}") from error
     _check(tree)
     return tree

@@ -65,8 +65,8 @@ class Camera:
             placed = look_at(position, target)
         if not np.isfinite(placed).all():
             raise pose.error(
-                f"'look_at' {target} must neither be at 'position' {position} nor straight above or "
-                "below it: upright there is none"
+                "'look_at' must not be at 'position' nor straight above or below it, found "
+                f"{target} and {position}"
             )
         return cls(
             width=section.whole_number("width", 1, 16384),

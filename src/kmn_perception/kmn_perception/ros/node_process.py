@@ -117,6 +117,12 @@ class ProcessClient:
             self._executor.spin_once(timeout_sec=POLL_PERIOD)
         return found
 
+    def pause(self, seconds: float) -> None:
+        """Let so many seconds pass, while messages are taken."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
+
     def set_parameters(self, service: Client, values: Mapping[str, Any], timeout: float) -> None:
         """Set parameters of another node, all or none, by its service for that.
 

@@ -13,7 +13,6 @@ from threading import Event
 from types import FrameType
 from typing import TypeVar
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -21,6 +20,7 @@ from kmn_perception.configuration.node_parameters import describe_parameters
 from kmn_perception.ros.parameter_files import useless_files
 from kmn_perception.ros.parameters import foreign_parameters
 from kmn_perception.ros.program import ros_session, split_arguments
+from kmn_perception.ros.steadfast_executor import SteadfastExecutor
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 TURNS = 10  # of the executor, for what the last words of a node bring about, as an action's result
@@ -99,8 +99,7 @@ class _Stop:
 
 def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], None]) -> None:
     """Execute callbacks in a thread until they fail or a signal comes, and destroy the node."""
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
+    executor = SteadfastExecutor(node)
     done = Future()
 
     def spin() -> None:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
+from rclpy.task import Future
 from tqdm import tqdm
 
 from kmn_msgs.action import OperateJoint
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
 from kmn_perception.model.actions import Action
-from kmn_perception.ros.node_process import NoAnswerError
+from kmn_perception.ros.node_process import NoAnswerError, ProcessClient
 from kmn_perception.ros.program import own_arguments, ros_session
 from kmn_skill.execution.goal import Goal
 from kmn_skill.experiments.door_system import DoorSystem
@@ -48,6 +50,44 @@ class Kill(NamedTuple):
     reason: str
 
 
+class Pursuit:
+    """A goal that is pursued.
+
+    Attributes
+    ----------
+    last
+        What was told last of it.
+    """
+
+    def __init__(
+        self,
+        client: ProcessClient,
+        timeout: float,
+        send: Callable[[Callable[[OperateJoint.Feedback], None]], Future],
+    ) -> None:
+        self._client, self._timeout = client, timeout
+        self.last = OperateJoint.Feedback()
+        self._answer = send(self._keep)
+
+    def _keep(self, feedback: OperateJoint.Feedback) -> None:
+        self.last = feedback
+
+    def is_over(self) -> bool:
+        """Tell whether there is a result."""
+        return bool(self._answer.done())
+
+    def wait(self, moment: float) -> None:
+        """Wait until so much of it (0 to 1) is done, or it is over."""
+        self._client.wait(
+            lambda: self.is_over() or self.last.progress >= moment, self._timeout, "skill_node"
+        )
+
+    def result(self) -> OperateJoint.Result:
+        """Wait for the result, and return it."""
+        self._client.wait(self.is_over, self._timeout, "skill_node")
+        return self._answer.result().result
+
+
 class KilledSystem(DoorSystem):
     """A system of which a node dies."""
 
@@ -71,24 +111,25 @@ class KilledSystem(DoorSystem):
         phase, progress
             Of the goal then.
         """
-        last = OperateJoint.Feedback()
+        pursuit = self.pursue(goal)
+        pursuit.wait(moment)
+        at = pursuit.last.phase, pursuit.last.progress
+        self.restart(node)
+        if node != "skill_node":
+            pursuit.result()
+        return at
 
-        def keep(feedback: OperateJoint.Feedback) -> None:
-            nonlocal last
-            last = feedback
+    def pursue(self, goal: Goal) -> Pursuit:
+        """Send a goal, and return the pursuit of it."""
+        return Pursuit(self._client, self._timeouts.goal, partial(self._send, goal))
 
-        answer = self._send(goal, keep)
-        self._client.wait(
-            lambda: answer.done() or last.progress >= moment, self._timeouts.goal, "skill_node"
-        )
-        process, at = self._processes[node], (last.phase, last.progress)
+    def restart(self, node: str) -> None:
+        """Kill a node, if it runs, start it again, and wait until it reports."""
+        process = self._processes[node]
         process.kill()
         process.start()
         self._heard.clear()  # no report of the one before is under way: it loads for seconds
         self._client.wait(lambda: node in self._heard, self._timeouts.start, f"the new {node}")
-        if node != "skill_node":
-            self._client.wait(answer.done, self._timeouts.goal, "skill_node")
-        return at
 
     @property
     def hinge(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -98,7 +99,8 @@ class Stopwatch:
             for key, value in ((pair.key, pair.value) for pair in status.values):
                 if key.startswith("error_"):
                     joint, errors = key.removeprefix("error_"), self.measured.errors
-                    errors[joint] = max(errors.get(joint, 0.0), float(value))
+                    with suppress(ValueError):  # of a stranger, who may report what he likes
+                        errors[joint] = max(errors.get(joint, 0.0), float(value))
 
     def _advance(self) -> None:
         """Add the time that passed to the present phase."""

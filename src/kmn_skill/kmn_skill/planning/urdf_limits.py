@@ -49,7 +49,9 @@ def _number(joint: ElementTree.Element, key: str, default: float) -> float:
     except ValueError:
         number = math.nan
     if math.isnan(number):
-        raise ValueError(f"it limits the {key} of joint {joint.get('name')} by what is no number: '{text}'")
+        raise ValueError(
+            f"it limits the {key} of joint {joint.get('name')} by what is no number: '{text}'"
+        )
     return number
 
 

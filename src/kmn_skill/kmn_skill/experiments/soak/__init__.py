@@ -1,0 +1,1 @@
+"""The whole system for hours, while nodes die, floods come, clocks jump and disks are full."""

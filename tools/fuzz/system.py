@@ -32,11 +32,12 @@ from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.ros.node_process import NoAnswerError
 from kmn_skill.experiments.door_system import DoorSystem
 from kmn_skill.experiments.settings import Experiment
-from kmn_skill.planning.robot import default_robot
+from kmn_skill.planning.robot import RobotModel, default_robot
 
 DEPTH = 10
 CAPTURE = 5.0  # seconds for valid messages of all topics to come
 MATCH = 5.0  # seconds for a publisher to find a subscription
+LATER = 0.5  # seconds until an answer that was sent before another one is there
 ANSWER = 60.0  # seconds for a node to answer; a busy machine needs some
 TOPIC, SERVICE, ACTION = "topic", "service", "action"
 
@@ -75,6 +76,7 @@ class FuzzedSystem(DoorSystem):
             control="action", viewer={"port": 0},
         )  # fmt: skip
         super().__init__({**experiment.evaluation._asdict(), "seed": seed}, options, experiment)
+        self._robot = RobotModel.load()
         self._publishers: dict[str, Any] = {}
         self._valid: dict[str, Any] = {}
         self._clients: dict[str, Any] = {}
@@ -145,6 +147,8 @@ class FuzzedSystem(DoorSystem):
             return ANSWERED
         answer = self._request(to.name, interface(to.type), content)
         self.probe(to.node)  # is answered later
+        with suppress(NoAnswerError):
+            self._client.wait(answer.done, LATER, to.node)
         return ANSWERED if answer.done() else REFUSED  # by rclpy, which then says nothing
 
     def deliver_line(self, text: str, entrances: Sequence[Entrance]) -> None:
@@ -237,17 +241,20 @@ class FuzzedSystem(DoorSystem):
         empty = {TOPIC: "", SERVICE: "Request", ACTION: "Goal"}[to.kind]
         valid = self._valid.get(to.name) or (getattr(cls, empty) if empty else cls)()
         if isinstance(valid, JointTrajectory):
-            return self._trajectory()
+            return self._trajectory(self._robot.told_names)
         if isinstance(valid, FollowJointTrajectory.Goal):
-            valid.trajectory = self._trajectory()
+            controllers = self._robot.controllers.values()
+            joints = [each.joints for each in controllers if to.name.endswith(each.name)]
+            valid.trajectory = self._trajectory(*joints)
         return valid
 
-    def _trajectory(self) -> JointTrajectory:
-        """Return the one that leaves the robot where it is."""
+    def _trajectory(self, joints: Sequence[str]) -> JointTrajectory:
+        """Return the one that leaves joints where they are."""
         state = self._valid.get(f"{self._node.get_namespace()}/joint_states", JointState())
-        point = JointTrajectoryPoint(positions=state.position)
+        known = dict(zip(state.name, state.position, strict=True))
+        point = JointTrajectoryPoint(positions=[known.get(name, 0.0) for name in joints])
         point.time_from_start.sec = 1
-        return JointTrajectory(joint_names=state.name, points=[point])
+        return JointTrajectory(joint_names=list(joints), points=[point])
 
     def _publisher(self, to: Entrance) -> Any:
         """Return a publisher that the node hears."""

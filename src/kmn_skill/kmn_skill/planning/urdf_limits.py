@@ -49,9 +49,7 @@ def _number(joint: ElementTree.Element, key: str, default: float) -> float:
     except ValueError:
         number = math.nan
     if math.isnan(number):
-        raise ValueError(
-            f"it limits the {key} of joint {joint.get('name')} by what is no number: '{text}'"
-        )
+        raise ValueError(f"it limits joint {joint.get('name')}, {key}, by no number: '{text}'")
     return number
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -46,7 +46,8 @@ def running(node: Node) -> Iterator[Any]:
 
 def test_what_ros_cannot_read_is_passed_over(graph: Graph, node: Node, running: Any) -> None:
     heard: list[str] = []
-    node.create_subscription(String, "texts", lambda message: heard.append(message.data), 10)
+    keep: Callable[[Any], None] = lambda message: heard.append(message.data)  # noqa: E731
+    node.create_subscription(String, "texts", keep, 10)
     peer = graph.start(lambda **options: Node("peer", **options))
     texts, clock = (
         peer.create_publisher(String, "texts", 10),

@@ -57,7 +57,7 @@ class _Fuzzing:
         self._batch: list[str] = []
 
     def run(self, cases: int) -> list[Outcome]:
-        """Send so many, and return how it went."""
+        """Send so many, or as many as there is time for, and return how it went."""
         number = len(self._entrances)
         shares = {to: len(range(i, cases, number)) for i, to in enumerate(self._entrances)}
         batches = [
@@ -66,7 +66,9 @@ class _Fuzzing:
             for first in range(0, share, BATCH)
         ]
         self._random.shuffle(batches)
+        sent: Counter[Entrance] = Counter()
         for done, (to, size) in enumerate(tqdm(batches, unit="batch", desc="messages"), start=1):
+            sent[to] += size
             try:
                 self._send(to, size)
                 self._look(to)
@@ -75,10 +77,9 @@ class _Fuzzing:
             except ProcessError as error:
                 self._blame(to, str(error))
                 self._system.revive()
-        return [
-            Outcome(str(to), share, self._counts[to], self._faults[to])
-            for to, share in shares.items()
-        ]
+            except KeyboardInterrupt:
+                break
+        return [Outcome(str(to), sent[to], self._counts[to], self._faults[to]) for to in shares]
 
     def _send(self, to: Entrance, size: int) -> None:
         self._batch.clear()

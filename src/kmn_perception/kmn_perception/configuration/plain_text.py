@@ -10,7 +10,7 @@ import yaml
 
 MAX_DEPTH = 64  # of lists and mappings in each other
 MAX_VALUES = 10**6  # a few lines of aliases can stand for billions
-MAX_WHOLE = 2**63  # beyond it numbers are no indices, seeds or sizes, and some no real numbers
+MAX_WHOLE = 2**64  # larger ones are no indices, seeds or sizes, and some no real numbers either
 
 
 def parse_yaml(text: str) -> Any:

@@ -43,7 +43,7 @@ class SoakSettings(NamedTuple):
     disk
         Bytes that may be written to a recording.
     warm_up
-        Hours after which the memory shall be flat; at most a third of the run.
+        Hours after which the memory shall be flat, in a run of three times as many or more.
     growth
         Of the memory from then on that is allowed, as a part of it.
     period

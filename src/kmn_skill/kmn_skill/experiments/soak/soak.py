@@ -26,6 +26,7 @@ from kmn_skill.experiments.soak.troubles import TROUBLES, TroubledSystem
 from kmn_skill.experiments.soak.usage import UsageLog
 
 OPENED, NOT_OPENED, NO_RESULT, LOST = "opened", "not opened", "no result", "its node was killed"
+STAMPS = ("flood", "clock")  # troubles whose stamps look as if frames were lost
 NOT_SHOWN = "no door was seen"
 ENDS = (OPENED, NOT_OPENED, NO_RESULT, LOST, NOT_SHOWN)
 
@@ -64,7 +65,6 @@ class Soak:
         with system, tqdm(unit="goal") as bar:
             while self.hours < self._options.hours:
                 self._pursue_next(system, model.sample(generator, 1)[0])
-                self._frames_lost = system.frames_lost
                 bar.set_postfix_str(self._in_short())
                 bar.update()
 
@@ -73,6 +73,7 @@ class Soak:
         system.watch(self.hours)
         random, settings = self._random, self._settings
         trouble = "" if random.random() < settings.calm else random.choice(TROUBLES)
+        lost_before = system.frames_lost
         moment, victim, end = random.uniform(0.0, settings.progress), "", NOT_SHOWN
         model, mode = self._experiment.kinematic_model(), self._options.mode
         try:
@@ -93,6 +94,8 @@ class Soak:
             reason = str(error)
             self._fallen += [f"{name} during '{trouble}': {reason}" for name in system.revive()]
         system.watch(self.hours)
+        if trouble not in STAMPS:
+            self._frames_lost += system.frames_lost - lost_before
         self._pursued.append(Pursued(self.hours, trouble, victim, end, reason))
 
     def _in_short(self) -> str:
@@ -107,9 +110,13 @@ class Soak:
             or any(growth > self._settings.growth for growth in self._growths().values())
         )
 
+    def _warm_up(self) -> float:
+        """Return the hours after which memory shall be flat; all of them in a run that is short."""
+        warm_up = self._settings.warm_up
+        return warm_up if self.hours >= 3.0 * warm_up else self.hours
+
     def _growths(self) -> dict[str, float]:
-        warm_up = min(self._settings.warm_up, self.hours / 3.0)
-        return {name: self._log.growth(name, warm_up) for name in self._log.nodes}
+        return {name: self._log.growth(name, self._warm_up()) for name in self._log.nodes}
 
     def report(self) -> str:
         """Return what has come of it for people to read."""
@@ -122,7 +129,7 @@ class Soak:
         rows.append(["all", *(str(ends[end]) for end in ENDS)])
         reasons = Counter(each.reason for each in self._pursued if each.reason)
         listed = [f"{count} x {reason}" for reason, count in reasons.most_common()]
-        lost = f"{self._frames_lost} frames lost on the way to morph_node"
+        lost = f"{self._frames_lost} frames lost but for floods and clock jumps"
         return "\n".join([
             f"{60.0 * self.hours:.0f} minutes", columns(rows), "", *listed, "",
             self._usage_table(), "", lost, *(f"FELL {text}" for text in self._fallen),

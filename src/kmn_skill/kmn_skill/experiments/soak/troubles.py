@@ -146,8 +146,8 @@ class TroubledSystem(KilledSystem):
                 for file in (folder / "full.gif", None):
                     self.record(file, RATE)
                     self._client.pause(self._settings.period)
-                left = [file.name for file in folder.iterdir() if file.stat().st_size]
-        return f"sim_node by {disk}, {len(left)} files left"
+                left = [file.name for file in folder.iterdir()]
+        return f"sim_node by {disk}, left: {', '.join(left) or 'nothing'}"
 
     def _hear(self, message: DiagnosticArray) -> None:
         super()._hear(message)

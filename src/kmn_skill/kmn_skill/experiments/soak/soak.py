@@ -82,7 +82,7 @@ class Soak:
             pursuit = system.pursue(self._experiment.goal(model.actions[0], mode))
             if trouble:
                 pursuit.wait(moment)
-                victim = system.happen(trouble, random)
+                victim = self._let_happen(system, trouble)
             if victim == "skill_node" and trouble == "kill" and not pursuit.is_over():
                 end, reason = LOST, ""
             else:
@@ -97,6 +97,14 @@ class Soak:
         if trouble not in STAMPS:
             self._frames_lost += system.frames_lost - lost_before
         self._pursued.append(Pursued(self.hours, trouble, victim, end, reason))
+
+    def _let_happen(self, system: TroubledSystem, trouble: str) -> str:
+        """Let something happen; a node that does not answer meanwhile is no end of the goal."""
+        try:
+            return system.happen(trouble, self._random)
+        except NoAnswerError as error:
+            self._fallen.append(f"during '{trouble}': {error}")
+            return str(error)
 
     def _in_short(self) -> str:
         ends = Counter(each.end for each in self._pursued)

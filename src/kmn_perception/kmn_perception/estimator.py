@@ -112,7 +112,7 @@ class MorphEstimator:
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
         camera = self.model.camera
-        depth = render(self.model.prototype_cubes, camera)
+        depth = render(self.model.prototype_cubes, camera, self.model.cylinder_axes)
         points = depth_to_cloud(depth, camera)
         self.estimate(Observation(points, camera))
         self.estimate(Observation(points, camera, depth=depth))
@@ -167,7 +167,8 @@ class MorphEstimator:
         joints = tuple(Quantity(joint.name, *state) for joint, *state in states)
         theta, gamma = model.split(values[:count])
         positions = {joint.name: joint.value for joint in joints}
-        distances = surface_distances(model.moved_cubes(values[:count], positions), points)
+        cubes = model.moved_cubes(values[:count], positions)
+        distances = surface_distances(cubes, points, model.cylinder_axes)
         residual, deviation = np.quantile(distances, (0.5, self.settings.deviation_share)).tolist()
         status, reason = self._judge(values, residual, deviation, doubt)
         return Estimate(

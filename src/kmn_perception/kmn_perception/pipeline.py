@@ -60,7 +60,8 @@ class MorphPipeline:
     def warm_up(self) -> None:
         """Compile and load all that the first estimate needs, so that it is not slow."""
         model, scene = self.model, self.settings.scene
-        points = depth_to_points(render(model.prototype_cubes, model.camera), model.camera)
+        depth = render(model.prototype_cubes, model.camera, model.cylinder_axes)
+        points = depth_to_points(depth, model.camera)
         find_support_plane(points, self.settings.plane)
         # At any angle that is not 0 the surface's rounding errors have concave edges.
         split = replace(self.settings.background, cluster=True, cluster_concave_angle=1e-9)

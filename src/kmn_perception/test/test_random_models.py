@@ -40,6 +40,22 @@ def linear(generator: np.random.Generator, constant: Vector, names: list[str]) -
     return entries
 
 
+def random_body(
+    generator: np.random.Generator, names: list[str], kinds: list[tuple[str, str]]
+) -> dict[str, Any]:
+    """Return a cuboid, or a cylinder that no scale flattens."""
+    body = {"centre": linear(generator, generator.uniform(-0.4, 0.4, 3) + [0, 0, 1], names)}
+    scaled = {axis for kind, axis in kinds if kind == "scale"}
+    possible = [axis for axis in "xyz" if scaled <= {axis}]
+    if possible and generator.uniform() < 0.6:
+        radius, length, _ = linear(
+            generator, generator.uniform([0.1, 0.2, 0], [0.3, 0.8, 1]), names
+        )
+        axis = str(generator.choice(possible))
+        return {"shape": "cylinder", **body, "axis": axis, "radius": radius, "length": length}
+    return {**body, "size": linear(generator, generator.uniform(0.2, 0.8, 3), names)}
+
+
 def random_joint(
     generator: np.random.Generator, body: str, parent: str, names: list[str]
 ) -> dict[str, Any]:
@@ -67,10 +83,7 @@ def random_file(seed: int) -> dict[str, Any]:
         parent = str(generator.choice([WORLD, *bodies]))
         if i and generator.uniform() < 0.8:
             joints[f"j{i}"] = random_joint(generator, f"b{i}", parent, names)
-        bodies[f"b{i}"] = {
-            "centre": linear(generator, generator.uniform(-0.4, 0.4, 3) + [0, 0, 1], names),
-            "size": linear(generator, generator.uniform(0.2, 0.8, 3), names),
-        }
+        bodies[f"b{i}"] = random_body(generator, names, kinds)
     return {
         "name": "random",
         "camera": "furniture",
@@ -104,15 +117,23 @@ def derivative(function: Any, values: Vector, step: float = STEP) -> Vector:
     return np.stack(columns, axis=-1)
 
 
-def nearest_hit(cubes: Vector, camera: Camera, u: float, v: float) -> float:
-    """Return the depth at which the ray of a pixel meets a cube, by clipping; infinite: nowhere."""
+def nearest_hit(model: KinematicModel, cubes: Vector, camera: Camera, u: float, v: float) -> float:
+    """Return the depth at which the ray of a pixel meets a body, by clipping; infinite: nowhere."""
     direction = camera.pose[:3, :3] @ [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1]
     nearest = np.inf
-    for cube in cubes:
+    for body, cube in zip(model.bodies, cubes, strict=True):
         inverse = np.linalg.inv(cube)
         start, along = (inverse @ camera.pose[:, 3])[:3], inverse[:3, :3] @ direction
         with np.errstate(divide="ignore"):
             ends = np.sort((np.array([[-0.5], [0.5]]) - start) / along, axis=0)
+        if body.is_cylinder:
+            start, along = (np.delete(each, body.axis) for each in (start, along))
+            nearest_point = -(start @ along) / (along @ along)  # to the axis
+            square = 0.25 - np.sum((start + nearest_point * along) ** 2)
+            if square <= 0.0:
+                continue
+            half_chord = np.sqrt(square / (along @ along))
+            ends = np.c_[ends[:, body.axis], nearest_point + [-half_chord, half_chord]]
         enter, leave = ends[0].max(), ends[1].min()
         if enter < leave and enter > 0.0:
             nearest = min(nearest, enter)
@@ -125,8 +146,10 @@ def test_renderer_and_fit_see_what_clipped_rays_see(folder: Path, seed: int) -> 
     model, values = random_model(seed, folder)
     camera = model.camera.resized(32, 24)
     cubes = model.unit_cubes(*model.split(values))
-    expected = np.array([[nearest_hit(cubes, camera, u, v) for u in range(32)] for v in range(24)])
-    depth = render(cubes, camera)
+    expected = np.array(
+        [[nearest_hit(model, cubes, camera, u, v) for u in range(32)] for v in range(24)]
+    )
+    depth = render(cubes, camera, model.cylinder_axes)
     np.testing.assert_array_equal(np.isfinite(depth), np.isfinite(expected))
     np.testing.assert_allclose(
         depth[np.isfinite(depth)], expected[np.isfinite(expected)], rtol=1e-5
@@ -206,8 +229,8 @@ def test_the_fit_stays_at_a_truth_that_it_is_started_from(folder: Path, seed: in
         return
     found = refine(model, observation, values, FIT)
     assert found.misfit < 0.01
-    depth = render(model.unit_cubes(*model.split(found.values)), model.camera)
-    seen = render(model.unit_cubes(*model.split(values)), model.camera)
+    depth = render(model.unit_cubes(*model.split(found.values)), model.camera, model.cylinder_axes)
+    seen = render(model.unit_cubes(*model.split(values)), model.camera, model.cylinder_axes)
     both = np.isfinite(depth) & np.isfinite(seen)
     assert np.median(np.abs(depth[both] - seen[both])) < 1e-3
     assert (np.isfinite(depth) == np.isfinite(seen)).mean() > 0.99

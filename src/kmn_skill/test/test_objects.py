@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numpy.typing import NDArray
 
+from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_observation import when_closed
@@ -53,6 +56,19 @@ def test_bodies_and_contacts_move_as_the_model_has_it(name: str) -> None:
     assert np.linalg.norm(across) == pytest.approx(action.grasp.thickness(gamma))
     np.testing.assert_allclose(across / np.linalg.norm(across), grasp[:3, 2], atol=1e-9)
     np.testing.assert_allclose((first + second)[:3, 3] / 2.0, grasp[:3, 3], atol=1e-9)
+
+
+def test_a_round_bar_is_kept_clear_of_as_the_cuboid_that_holds_it(tmp_path: Path) -> None:
+    content = yaml.safe_load(resources.find("config/models", "cupboard_door").read_text())
+    bar = {"shape": "cylinder", "axis": "z", "radius": 0.012, "length": 0.16}
+    content["bodies"]["bar"] = bar | {"centre": content["bodies"]["bar"]["centre"]}
+    (tmp_path / "round.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    model = KinematicModel.load(tmp_path / "round.yaml")
+    setup = PlanningSetup.load(model)
+    world = World(setup, *model.split(model.prototype))
+    np.testing.assert_allclose(world.object_boxes()["bar"].size, [0.024, 0.024, 0.16])
+    contacts = world.poses(np.array([[*setup.robot.home, 0.0, 0.0]]), list(CONTACTS))[0]
+    assert np.linalg.norm(np.subtract(*contacts[:, :3, 3])) == pytest.approx(0.024)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

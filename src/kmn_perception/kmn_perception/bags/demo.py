@@ -201,7 +201,12 @@ def draw_frames(
         segments = segment(points, pose, pose[:3, 3], settings.background, settings.scene)
         seen = [ShownObject(segments.of_object(i), NOTHING, True) for i in range(segments.objects)]
         found = [
-            ShownObject(segments.points[:0], found.unit_cubes, found.status is Status.OK)
+            ShownObject(
+                segments.points[:0],
+                found.unit_cubes,
+                found.status is Status.OK,
+                model.axes_among(len(found.unit_cubes)),
+            )
             for found in (answer.objects if answer else [])
         ]
         yield Overlay(

@@ -24,7 +24,8 @@ def full_cloud(model: KinematicModel) -> PointCloud2:
     """
     zero = np.zeros(len(model.parameters))
     cubes = np.concatenate((model.unit_cubes(*model.split(zero)), _floor_and_wall(model)))
-    points = depth_to_points(render(cubes, model.camera), model.camera)
+    depth = render(cubes, model.camera, model.axes_among(len(cubes)))
+    points = depth_to_points(depth, model.camera)
     return cloud_from_points(points, Header(frame_id="camera_optical_frame"))
 
 

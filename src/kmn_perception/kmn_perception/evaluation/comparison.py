@@ -108,9 +108,11 @@ class Comparison:
         self._methods, self.left_out = choose(
             [name for name in names if name != LIMIT], self.model, self.networks, settings
         )
+        if LIMIT in names and any(body.is_cylinder for body in self.model.bodies):
+            self.left_out[LIMIT] = "it is known of cuboids only"
         if self.left_out and request.methods is not None and not request.lenient:
             raise MethodError("; ".join(f"{name}: {why}" for name, why in self.left_out.items()))
-        self._limit = LIMIT in names
+        self._limit = LIMIT in names and LIMIT not in self.left_out
         self._request, self._settings = request, settings
         self._sensor, self.noise = sensor_of(self.networks, request.noise)
         self.counted = {name: method.counted for name, method in self._methods.items()}
@@ -131,7 +133,7 @@ class Comparison:
             methods = {name: method for name, method in methods.items() if name not in PEERS}
         if self._limit:
             methods[LIMIT] = Method(lambda seen: self._best(seen, truth), counted=0)
-        return visible_fraction(cubes, observation.camera), {
+        return visible_fraction(cubes, observation.camera, self.model.cylinder_axes), {
             name: self._measure(method, observation, truth) for name, method in methods.items()
         }
 

@@ -65,6 +65,8 @@ class ModelMeasurement:
         settings = pick(EstimatorSettings, parameter_values("morph_node"))
         estimators = [MorphEstimator.load(model, "", settings) for model in models]
         self.choice = ModelChoice(estimators)
+        for each in self.choice.models:
+            each.require_cuboids("the evaluation of several models")
         self._things = ThingSettings.load()
         self._seed, self._noise, self._objects = seed, noise, objects
 

@@ -187,7 +187,8 @@ def _iterated(network: MorphNetwork, counted: int) -> Method:
 
 def _prototype(model: KinematicModel) -> NDArray[np.float32]:
     """Return the prototype's cloud, as the canonical camera sees it."""
-    return depth_to_cloud(render(model.prototype_cubes, model.camera), model.camera)
+    depth = render(model.prototype_cubes, model.camera, model.cylinder_axes)
+    return depth_to_cloud(depth, model.camera)
 
 
 def _registered(model: KinematicModel, aligner: Aligner) -> Method:

@@ -14,13 +14,17 @@ CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, 8)
 REACH = 4.0  # images; the view is unlimited but for what lies farther beside the sensor's image
 
 
-def visible_fraction(unit_cubes: NDArray[np.float64], camera: Camera) -> float:
+def visible_fraction(
+    unit_cubes: NDArray[np.float64], camera: Camera, axes: NDArray[np.int64] | None = None
+) -> float:
     """Return the share of an object's silhouette that lies inside the image, in pixels.
 
     Parameters
     ----------
     unit_cubes
         (B, 4, 4) maps of the unit cube to the world, as from ``KinematicModel.unit_cubes``.
+    axes
+        (B,) as ``KinematicModel.cylinder_axes``; without them, all bodies are cuboids.
     """
     left, right, top, bottom = _beyond_the_image(unit_cubes, camera)
     if not (left or right or top or bottom):
@@ -32,7 +36,7 @@ def visible_fraction(unit_cubes: NDArray[np.float64], camera: Camera) -> float:
         cx=camera.cx + left,
         cy=camera.cy + top,
     )
-    silhouette = np.isfinite(render(unit_cubes, enlarged))
+    silhouette = np.isfinite(render(unit_cubes, enlarged, axes))
     inside = silhouette[top : top + camera.height, left : left + camera.width]
     return float(inside.sum() / silhouette.sum())
 

@@ -34,4 +34,5 @@ def _show(found: ObjectEstimate, model: KinematicModel) -> ShownObject:
     cubes: NDArray[np.float64] = np.empty((0, 4, 4))
     if np.isfinite(estimate.theta).all():
         cubes = model.unit_cubes(estimate.theta, estimate.gamma)
-    return ShownObject(found.observation.points, cubes, estimate.status is Status.OK)
+    points, accepted = found.observation.points, estimate.status is Status.OK
+    return ShownObject(points, cubes, accepted, model.axes_among(len(cubes)))

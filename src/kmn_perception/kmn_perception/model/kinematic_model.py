@@ -16,6 +16,7 @@ from kmn_perception.model import model_file
 from kmn_perception.model.actions import Action, read_actions
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.parts import (
+    NO_AXIS,
     WORLD,
     Body,
     Joint,
@@ -36,7 +37,7 @@ _TURNED = (("rotation", "z"), ("scale", "x"), ("scale", "y"))
 
 @dataclass(frozen=True, eq=False)
 class KinematicModel:
-    """A parametrised object m(theta, gamma) made of cuboids.
+    """A parametrised object m(theta, gamma) made of cuboids and cylinders.
 
     Attributes
     ----------
@@ -107,6 +108,7 @@ class KinematicModel:
         except ValueError as error:
             raise section.error(f"theta: {error}") from error
         bodies = model_file.read_bodies(section, gamma)
+        model_file.check_round(section, bodies, transformation.kinds)
         joints = model_file.read_joints(section, bodies, gamma)
         model = cls(
             name=section.text("name"),
@@ -164,6 +166,25 @@ class KinematicModel:
         """(B, 4, 4) bodies of the prototype, see `unit_cubes`."""
         return self.unit_cubes(*self.split(self.prototype))
 
+    @cached_property
+    def cylinder_axes(self) -> NDArray[np.int64]:
+        """(B,) the axes of the bodies that are cylinders, `NO_AXIS` of the others."""
+        return np.array([body.axis for body in self.bodies])
+
+    def axes_among(self, count: int) -> NDArray[np.int64]:
+        """Return `cylinder_axes` (count,) of its bodies and of cuboids that come after them."""
+        axes = np.full(count, NO_AXIS)
+        axes[: len(self.bodies)] = self.cylinder_axes[:count]
+        return axes
+
+    def require_cuboids(self, what: str) -> None:
+        """Raise ``ConfigurationError`` if a body is a cylinder, of what takes none."""
+        for body in self.bodies:
+            if body.is_cylinder:
+                raise ConfigurationError(
+                    f"{self.name}: {what} takes cuboids only, and '{body.name}' is a cylinder"
+                )
+
     @property
     def depth_image(self) -> NetworkInput:
         """``input``; raise ``ConfigurationError`` where the file has none."""
@@ -212,7 +233,8 @@ class KinematicModel:
         Returns
         -------
         unit_cubes
-            (B, 4, 4) affine maps of [-0.5, 0.5]^3, one for each body, metres.
+            (B, 4, 4) affine maps of [-0.5, 0.5]^3, one for each body, metres. A cylinder is the
+            image of the one that this cube holds, along an axis of `cylinder_axes`.
         """
         cubes = np.zeros((len(self.bodies), 4, 4))
         for cube, body in zip(cubes, self.bodies, strict=True):

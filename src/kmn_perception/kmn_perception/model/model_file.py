@@ -8,10 +8,13 @@ import numpy as np
 
 from kmn_perception.configuration.section import Section, is_number
 from kmn_perception.model.parts import (
+    CUBOID,
+    CYLINDER,
     FIXED,
     JOINT_TYPES,
     PRISMATIC,
     REVOLUTE,
+    SHAPES,
     WORLD,
     Body,
     Joint,
@@ -28,6 +31,10 @@ JOINT_KEYS = {  # of each type, the required ones and the others
     REVOLUTE: (("body", "parent", "axis", "origin", "limits"), ("type",)),
     PRISMATIC: (("type", "body", "parent", "axis", "limits"), ()),
     FIXED: (("type", "body", "parent"), ()),
+}
+SHAPE_KEYS = {  # likewise
+    CUBOID: (("centre", "size"), ("shape",)),
+    CYLINDER: (("shape", "centre", "axis", "radius", "length"), ()),
 }
 UNITS = {"translation": "m", "rotation": "rad", "scale": ""}
 
@@ -55,8 +62,15 @@ def _linear(section: Section, key: str, gamma: Sequence[Parameter]) -> Linear:
     entries = section.values.get(key)
     if not isinstance(entries, list) or len(entries) != 3:
         raise section.error(f"'{key}' must be a list of 3 entries, found {entries!r}")
+    return _entries(section, key, entries, gamma)
+
+
+def _entries(
+    section: Section, key: str, entries: Sequence[object], gamma: Sequence[Parameter]
+) -> Linear:
+    """Read entries of a key, each a number or linear in gamma."""
     names = [parameter.name for parameter in gamma]
-    constant, slope = np.zeros(3), np.zeros((3, len(names)))
+    constant, slope = np.zeros(len(entries)), np.zeros((len(entries), len(names)))
     for row, entry in enumerate(entries):
         terms = entry if isinstance(entry, Mapping) else {"constant": entry}
         for name, value in terms.items():
@@ -77,13 +91,48 @@ def read_bodies(section: Section, gamma: Sequence[Parameter]) -> tuple[Body, ...
     bodies = section.section("bodies")
     if not bodies.values:
         raise section.error("'bodies' is empty")
-    return tuple(_read_body(bodies.section(name), name, gamma) for name in bodies.values)
+    return tuple(_read_shape(bodies.section(name), name, gamma) for name in bodies.values)
 
 
-def _read_body(section: Section, name: str, parameters: Sequence[Parameter]) -> Body:
-    section.allow(("centre", "size"))
+def check_round(section: Section, bodies: Sequence[Body], kinds: Sequence[tuple[str, str]]) -> None:
+    """Refuse cylinders that transformation parameters ``(kind, axis)`` would flatten."""
+    for body in bodies:
+        across = [AXES[k] for k in range(3) if body.is_cylinder and k != body.axis]
+        for axis in across:
+            if ("scale", axis) in kinds:
+                raise section.error(
+                    f"a scale along {axis} would flatten the cylinder '{body.name}'; "
+                    "let its 'radius' depend on gamma"
+                )
+
+
+def _read_shape(section: Section, name: str, parameters: Sequence[Parameter]) -> Body:
+    """Read a body of any shape."""
+    shape = section.text("shape", SHAPES, CUBOID)
+    section.allow(*SHAPE_KEYS[shape])
+    if shape == CUBOID:
+        return _read_cuboid(section, name, parameters)
+    axis = AXES.index(section.text("axis", AXES))
+    keys = ["length" if k == axis else "radius" for k in range(3)]
+    entries = [section.values[key] for key in keys]
+    factors = np.array([1.0 if k == axis else 2.0 for k in range(3)])
+    single = [_entries(section, keys[k], [entries[k]], parameters) for k in range(3)]
+    size = Linear(
+        factors * np.concatenate([each.constant for each in single]),
+        factors[:, None] * np.concatenate([each.slope for each in single]),
+    )
+    row, smallest, corner = _smallest(size, parameters)
+    if smallest <= 0.0:
+        raise section.error(
+            f"'{keys[row]}' must be positive within the limits, is "
+            f"{smallest / factors[row]:g} at gamma {corner}"
+        )
+    return Body(name, _linear(section, "centre", parameters), size, axis)
+
+
+def _read_cuboid(section: Section, name: str, parameters: Sequence[Parameter]) -> Body:
     body = Body(name, *(_linear(section, key, parameters) for key in ("centre", "size")))
-    smallest, corner = _smallest(body.size, parameters)
+    _, smallest, corner = _smallest(body.size, parameters)
     if smallest <= 0.0:
         raise section.error(
             f"'size' must be positive within the limits, is {body.size(corner)} at gamma {corner}"
@@ -94,14 +143,16 @@ def _read_body(section: Section, name: str, parameters: Sequence[Parameter]) -> 
 def read_alternatives(
     section: Section, parameters: Sequence[Parameter]
 ) -> dict[str, tuple[Body, ...]]:
-    """Read kinds of something, each of them any number of bodies."""
-    return {
-        kind: tuple(
-            _read_body(section.section(kind).section(name), name, parameters)
-            for name in section.section(kind).values
+    """Read kinds of something, each of them any number of cuboids."""
+    found = {}
+    for kind in section.values:
+        bodies = section.section(kind)
+        for name in bodies.values:
+            bodies.section(name).allow(("centre", "size"))
+        found[kind] = tuple(
+            _read_cuboid(bodies.section(name), name, parameters) for name in bodies.values
         )
-        for kind in section.values
-    }
+    return found
 
 
 def read_surroundings(section: Section, parameters: Sequence[Parameter]) -> tuple[Body, ...]:
@@ -114,7 +165,7 @@ def read_surroundings(section: Section, parameters: Sequence[Parameter]) -> tupl
         place = section.section(name)
         place.allow(("centre", "size"), ("mirrored",))
         centre, size = (_linear(place, key, parameters) for key in ("centre", "size"))
-        smallest, corner = _smallest(size, parameters)
+        _, smallest, corner = _smallest(size, parameters)
         if smallest < -ROUNDING:
             raise place.error(f"'size' must not be negative, is {size(corner)} at {corner}")
         if not place.flag("mirrored"):
@@ -125,13 +176,15 @@ def read_surroundings(section: Section, parameters: Sequence[Parameter]) -> tupl
     return tuple(bodies)
 
 
-def _smallest(size: Linear, parameters: Sequence[Parameter]) -> tuple[float, tuple[float, ...]]:
-    """Return the smallest entry of a size within the limits (m), and where it is found."""
+def _smallest(
+    size: Linear, parameters: Sequence[Parameter]
+) -> tuple[int, float, tuple[float, ...]]:
+    """Return which entry of a size is smallest within the limits, it (m), and where it is so."""
     limits = np.array([parameter.limits for parameter in parameters]).reshape(-1, 2)
     corners = np.where(size.slope > 0.0, limits[:, 0], limits[:, 1])
     least = size.constant + (size.slope * corners).sum(axis=1)
     row = int(least.argmin())
-    return float(least[row]), tuple(corners[row].tolist())
+    return row, float(least[row]), tuple(corners[row].tolist())
 
 
 def read_joints(

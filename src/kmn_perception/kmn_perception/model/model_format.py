@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from kmn_perception.model.model_file import JOINT_KEYS
-from kmn_perception.model.parts import JOINT_TYPES, REVOLUTE
+from kmn_perception.model.model_file import JOINT_KEYS, SHAPE_KEYS
+from kmn_perception.model.parts import CUBOID, JOINT_TYPES, REVOLUTE, SHAPES
 from kmn_perception.model.transformation import AXES, KINDS
 
 REQUIRED = "required"
@@ -13,11 +13,10 @@ NUMBER: dict[str, Any] = {"type": "number"}
 NUMBERS_2, NUMBERS_3 = (
     {"type": "array", "items": NUMBER, "minItems": n, "maxItems": n} for n in (2, 3)
 )
+ENTRY = {"oneOf": [NUMBER, {"type": "object", "additionalProperties": NUMBER}]}
 LINEAR = {
     "type": "array",
-    "items": {
-        "oneOf": [NUMBER, {"type": "object", "additionalProperties": NUMBER}],
-    },
+    "items": ENTRY,
     "minItems": 3,
     "maxItems": 3,
 }
@@ -58,9 +57,16 @@ THETA: Keys = {
     "limits": Key(NUMBERS_2, "m, rad, 1", REQUIRED, PARAMETER["limits"].meaning),
 }  # fmt: skip
 BODY: Keys = {
-    "centre": Key(LINEAR, LINEAR_UNIT, REQUIRED, "Of the cuboid."),
-    "size": Key(LINEAR, LINEAR_UNIT, REQUIRED, "Along x, y, z; positive within all limits."),
-}
+    "shape": Key(_one_of(*SHAPES), ", ".join(f"`{shape}`" for shape in SHAPES), f"`{CUBOID}`",
+                 "Of the body; no scale of theta flattens a cylinder."),
+    "centre": Key(LINEAR, LINEAR_UNIT, REQUIRED, "Of the body."),
+    "size": Key(LINEAR, LINEAR_UNIT, "required of a cuboid",
+                "Along x, y, z; positive within all limits."),
+    "axis": Key(_one_of(*AXES), "`x`, `y`, `z`", "required of a cylinder", "Along which it lies."),
+    "radius": Key(ENTRY, "an entry, m", "required of a cylinder",
+                  "Positive within all limits, as its length."),
+    "length": Key(ENTRY, "an entry, m", "required of a cylinder", "Along its axis."),
+}  # fmt: skip
 JOINT: Keys = {
     "type": Key(_one_of(*JOINT_TYPES), ", ".join(f"`{kind}`" for kind in JOINT_TYPES),
                 f"`{REVOLUTE}`", "How it moves."),
@@ -107,7 +113,7 @@ INPUT: Keys = {
     "max_gap": Key(_whole(0, 64), "fine pixels", REQUIRED, "Holes up to this are closed."),
 }  # fmt: skip
 SURROUNDING: Keys = {
-    **BODY,
+    "centre": Key(LINEAR, LINEAR_UNIT, REQUIRED, "Of the cuboid."),
     "size": Key(LINEAR, LINEAR_UNIT, REQUIRED, "Along x, y, z; 0 where there is no such body."),
     "mirrored": Key({"type": "boolean"}, "true or false", "`false`",
                     "There is another one at the opposite y: NAME_left and NAME_right."),
@@ -148,7 +154,7 @@ MODEL: Keys = {
                   "file beside this one."),
     "theta": Key({}, "list", REQUIRED, "Transformation parameters, of the whole object."),
     "gamma": Key({}, "list", "none", "Configuration parameters, of its bodies and joints."),
-    "bodies": Key({}, "by name", REQUIRED, "Cuboids that are rendered and fitted."),
+    "bodies": Key({}, "by name", REQUIRED, "Cuboids and cylinders that are rendered and fitted."),
     "joints": Key({}, "by name", "none", "What lets bodies move."),
     "actions": Key({}, "by name", "none", "What a robot can do."),
     "stem": Key({}, "see below", "none",
@@ -215,7 +221,7 @@ def schema() -> dict[str, Any]:
         mechanics=mechanics,
         theta={**_list(_object(THETA)), "minItems": 1},
         gamma=_list(_object(PARAMETER)),
-        bodies={**_by_name(_object(BODY)), "minProperties": 1},
+        bodies={**_by_name(_body()), "minProperties": 1},
         joints=_by_name(_joint()),
         actions=_by_name(action),
         stem=_object(STEM),
@@ -255,6 +261,19 @@ def _joint() -> dict[str, Any]:
         "then": revolute,
         "else": {"if": is_prismatic, "then": prismatic, "else": fixed},
     }
+
+
+def _body() -> dict[str, Any]:
+    """Return the schema of a body: which keys it has depends on its shape."""
+    cuboid, cylinder = (
+        {
+            **_object({name: BODY[name] for name in BODY if name in (*required, *optional)}),
+            "required": list(required),
+        }
+        for required, optional in SHAPE_KEYS.values()
+    )
+    is_cuboid = {"properties": {"shape": {"const": CUBOID}}}
+    return {"type": "object", "if": is_cuboid, "then": cuboid, "else": cylinder}
 
 
 def _list(entry: dict[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model import urdf_elements as urdf
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.model.parts import PRISMATIC, WORLD
+from kmn_perception.model.parts import NO_AXIS, PRISMATIC, WORLD
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -52,14 +52,14 @@ def object_urdf(
         else:
             axis = axis * np.prod(signs)  # mirrored, it turns the other way
         robot.append(urdf.model_joint(joint, ends, place, axis, tuple(limits.tolist())))
-    cuboids = [(body.name, body.centre(gamma), body.size(gamma)) for body in model.bodies]
+    solids = [(b.name, b.centre(gamma), b.size(gamma), b.axis) for b in model.bodies]
     if model.stem is not None:
-        cuboids.append((model.stem.body.name, *model.stem.cuboid(gamma)))
-    for name, centre, size in cuboids:
+        solids.append((model.stem.body.name, *model.stem.cuboid(gamma), NO_AXIS))
+    for name, centre, size, axis in solids:
         carrier = name if name in links else WORLD
         place = factors * centre - origins[carrier]
         for kind in ("visual", "collision"):
-            urdf.add_box(links[carrier], kind, place, np.abs(factors) * size)
+            urdf.add_solid(links[carrier], kind, place, np.abs(factors) * size, axis)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 

@@ -12,6 +12,8 @@ from kmn_perception.model.rotation import matrix_from_quaternion
 
 REVOLUTE, PRISMATIC, FIXED = JOINT_TYPES = ("revolute", "prismatic", "fixed")
 WORLD = "world"  # parent of what stands still
+CUBOID, CYLINDER = SHAPES = ("cuboid", "cylinder")
+NO_AXIS = -1  # of a cuboid, among the axes of cylinders
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,24 @@ class Linear:
 
 @dataclass(frozen=True)
 class Body:
-    """A cuboid in the object frame: centre and size in metres."""
+    """A cuboid in the object frame, or the cylinder that it holds: centre and size in metres.
+
+    Attributes
+    ----------
+    axis
+        Of the cylinder: 0, 1 or 2, along which it is as long as the cuboid; its diameter is the
+        size along the other two. `NO_AXIS`: it is the cuboid itself.
+    """
 
     name: str
     centre: Linear
     size: Linear
+    axis: int = NO_AXIS
+
+    @property
+    def is_cylinder(self) -> bool:
+        """Whether it is round."""
+        return self.axis != NO_AXIS
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,21 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.parts import NO_AXIS
 
 
-def render(unit_cubes: NDArray[np.float64], camera: Camera) -> NDArray[np.float32]:
-    """Cast a ray through the centre of every pixel onto affine images of the unit cube.
+def render(
+    unit_cubes: NDArray[np.float64], camera: Camera, axes: NDArray[np.int64] | None = None
+) -> NDArray[np.float32]:
+    """Cast a ray through the centre of every pixel onto affine images of cube and cylinder.
 
     Parameters
     ----------
     unit_cubes
         (B, 4, 4) maps of the unit cube [-0.5, 0.5]^3 to the world, as from
         ``KinematicModel.unit_cubes``.
+    axes
+        (B,) as ``KinematicModel.cylinder_axes``; without them, all bodies are cuboids.
 
     Returns
     -------
@@ -24,7 +29,7 @@ def render(unit_cubes: NDArray[np.float64], camera: Camera) -> NDArray[np.float3
         (height, width) metres along the optical axis; NaN where there is nothing, or something
         nearer or farther than the camera measures.
     """
-    return _render(unit_cubes, camera, None)
+    return _render(unit_cubes, camera, None, axes)
 
 
 def render_bodies(
@@ -40,18 +45,22 @@ def render_bodies(
         (height, width) index of the cube; -1 where there is none.
     """
     bodies = np.full((camera.height, camera.width), -1, dtype=np.int16)
-    return _render(unit_cubes, camera, bodies), bodies
+    return _render(unit_cubes, camera, bodies, None), bodies
 
 
 def _render(
-    unit_cubes: NDArray[np.float64], camera: Camera, bodies: NDArray[np.int16] | None
+    unit_cubes: NDArray[np.float64],
+    camera: Camera,
+    bodies: NDArray[np.int16] | None,
+    axes: NDArray[np.int64] | None,
 ) -> NDArray[np.float32]:
     depth = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
     for index, cube in enumerate(unit_cubes):
         cube_to_camera = camera.world_to_camera @ cube
         window = _window(cube_to_camera, camera)
-        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, window, bodies, index)
+        axis = NO_AXIS if axes is None else int(axes[index])
+        _cast(depth, np.linalg.inv(cube_to_camera), *intrinsics, window, bodies, index, axis)
     depth[(depth < camera.near) | (depth > camera.far)] = np.nan
     return depth
 
@@ -122,13 +131,17 @@ def _cast(
     window: tuple[int, int, int, int],
     bodies: NDArray[np.int16] | None,
     index: int,
+    axis: int,
 ) -> None:
-    """Lower ``depth`` to where the rays of the window enter the cube."""
+    """Lower ``depth`` to where the rays of the window enter the cube, or its cylinder."""
     u0, u1, v0, v1 = window
     for v in range(v0, v1):
         ray_y = (v - cy) / fy
         for u in range(u0, u1):
-            enter = meet_cube(camera_to_cube, (u - cx) / fx, ray_y)
+            if axis == NO_AXIS:
+                enter = meet_cube(camera_to_cube, (u - cx) / fx, ray_y)
+            else:
+                enter = meet_cylinder(camera_to_cube, axis, (u - cx) / fx, ray_y)
             if enter < depth[v, u]:
                 depth[v, u] = enter
                 if bodies is not None:
@@ -156,4 +169,35 @@ def meet_cube(camera_to_cube: NDArray[np.float64], ray_x: float, ray_y: float) -
         first, second = (-0.5 - start) / slope, (0.5 - start) / slope
         enter = max(enter, min(first, second))
         leave = min(leave, max(first, second))
+    return enter if enter < leave else np.inf
+
+
+@njit(cache=True)
+def meet_cylinder(
+    camera_to_cube: NDArray[np.float64], axis: int, ray_x: float, ray_y: float
+) -> float:
+    """Return the depth at which the ray (x, y, 1) enters the cylinder that the unit cube holds.
+
+    It lies along an axis of the cube. See `meet_cube`.
+    """
+    square, product, rest = 0.0, 0.0, -0.25  # of the depth's polynomial: inside it is negative
+    enter, leave = 0.0, np.inf
+    for k in range(3):
+        row = camera_to_cube[k]
+        slope, start = row[0] * ray_x + row[1] * ray_y + row[2], row[3]
+        if k != axis:
+            square += slope * slope
+            product += slope * start
+            rest += start * start
+        elif abs(slope) < 1e-12:
+            if abs(start) > 0.5:
+                return np.inf
+        else:
+            first, second = (-0.5 - start) / slope, (0.5 - start) / slope
+            enter, leave = max(enter, min(first, second)), min(leave, max(first, second))
+    discriminant = product * product - square * rest
+    if discriminant <= 0.0:  # beside it, but for a ray along the axis
+        return enter if rest < 0.0 and enter < leave else np.inf
+    root = np.sqrt(discriminant)
+    enter, leave = max(enter, (-product - root) / square), min(leave, (-product + root) / square)
     return enter if enter < leave else np.inf

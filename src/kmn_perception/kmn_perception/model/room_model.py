@@ -66,6 +66,7 @@ class RoomModel:
             If a key is missing, unknown or wrong.
         """
         model = KinematicModel.load(name_or_path)
+        model.require_cuboids("a door in its wall")
         section = Section.load(resources.find("config/models", name_or_path))
         surroundings = section.section("surroundings")
         surroundings.allow(("parameters", "bodies"))

@@ -7,7 +7,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kmn_perception.model.parts import Joint
+from kmn_perception.model.parts import NO_AXIS, Joint
+
+FROM_Z = ((0.0, np.pi / 2.0, 0.0), (np.pi / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # to x, y, z: rpy
 
 
 def numbers(values: ArrayLike) -> str:
@@ -52,12 +54,27 @@ def model_joint(
     return element
 
 
-def add_box(
-    link: ElementTree.Element, kind: str, centre: ArrayLike, size: ArrayLike
+def add_solid(
+    link: ElementTree.Element,
+    kind: str,
+    centre: ArrayLike,
+    size: NDArray[np.float64],
+    axis: int = NO_AXIS,
 ) -> ElementTree.Element:
-    """Add a box to a link, as ``visual`` or ``collision``, and return it."""
+    """Add a box to a link, as ``visual`` or ``collision``, and return it.
+
+    Parameters
+    ----------
+    axis
+        Of the cylinder that is added in place of the box that holds it, see `Body`.
+    """
     element = ElementTree.SubElement(link, kind)
-    ElementTree.SubElement(element, "origin", xyz=numbers(centre))
+    place = ElementTree.SubElement(element, "origin", xyz=numbers(centre))
     geometry = ElementTree.SubElement(element, "geometry")
-    ElementTree.SubElement(geometry, "box", size=numbers(size))
+    if axis == NO_AXIS:
+        ElementTree.SubElement(geometry, "box", size=numbers(size))
+        return element
+    place.set("rpy", numbers(FROM_Z[axis]))
+    radius, length = numbers(size[[axis - 1]] / 2.0), numbers(size[[axis]])
+    ElementTree.SubElement(geometry, "cylinder", radius=radius, length=length)
     return element

@@ -75,7 +75,8 @@ class Cascade(MorphNetwork):
     def usual_centre(self) -> NDArray[np.float64]:
         """(3,) centre of the prototype's points as the canonical camera sees them, metres."""
         model = self.model
-        points = depth_to_cloud(render(model.prototype_cubes, model.camera), model.camera)
+        depth = render(model.prototype_cubes, model.camera, model.cylinder_axes)
+        points = depth_to_cloud(depth, model.camera)
         centre: NDArray[np.float64] = points.mean(axis=0, dtype=np.float64)
         return centre
 

@@ -94,6 +94,7 @@ def describe(model: KinematicModel) -> dict[str, Any]:
                 for part in (body.centre, body.size)
                 for linear in (part.constant, part.slope)
             ]
+            + ([body.axis] if body.is_cylinder else [])
             for body in model.bodies
         },
         "camera": {

@@ -66,7 +66,7 @@ class Window:
         centre, size = (low + high) / 2.0, np.minimum((high - low) * margin, largest)
         pixels = np.maximum(8, np.rint(np.sqrt(area * size / size[::-1]) / 8.0).astype(int) * 8)
         camera = _crop(model.camera, centre - size / 2.0, size, pixels)
-        return cls(body, camera, _plane(render(model.prototype_cubes, camera)))
+        return cls(body, camera, _plane(render(model.prototype_cubes, camera, model.cylinder_axes)))
 
     @classmethod
     def of_model(
@@ -156,8 +156,8 @@ def morph_of_body(
 
 def _extent(model: KinematicModel, body: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and largest u, v (2,) of a body of the prototype in the canonical image."""
-    cube = model.prototype_cubes[body : body + 1]
-    v, u = np.nonzero(~np.isnan(render(cube, model.camera)))
+    cube, axis = (of[body : body + 1] for of in (model.prototype_cubes, model.cylinder_axes))
+    v, u = np.nonzero(~np.isnan(render(cube, model.camera, axis)))
     if not len(u):
         raise ConfigurationError(
             f"{model.name}: the camera does not see the prototype's {model.bodies[body].name}"

@@ -13,10 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.model.parts import NO_AXIS
 from kmn_perception.refinement.geometry import cuboids
 from kmn_perception.refinement.image import InverseDepthImage
 from kmn_perception.refinement.problem import Problem
-from kmn_perception.refinement.solids import raycast_any
+from kmn_perception.refinement.solids import AXIS, raycast_any
 from kmn_perception.refinement.support_settings import CurvatureSettings
 
 TERMS = 6  # 1, x, y, x^2, y^2, x y along the face
@@ -103,7 +104,7 @@ def _sums(
     for i in range(0, pixels.shape[0], stride):
         u, v, seen = float(pixels[i, 0]), float(pixels[i, 1]), float(pixels[i, 2])
         predicted, body, face = raycast_any(solids, u, v)
-        if body < 0:
+        if body < 0 or solids[body, AXIS] != NO_AXIS:  # of a cylinder: it is round
             continue
         point = np.array([u, v, 1.0]) / seen - centres[body]
         place = np.zeros(3)

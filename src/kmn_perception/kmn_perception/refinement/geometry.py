@@ -1,4 +1,4 @@
-"""The cuboids of a kinematic model, and their derivatives by its parameters.
+"""The bodies of a kinematic model as maps of unit cubes, and their derivatives by its parameters.
 
 The parameters are the morphing parameters (theta, gamma), and after them the positions of those
 joints that are free; all others are at 0.
@@ -34,10 +34,11 @@ class Shape(NamedTuple):
     joint_axes: NDArray[np.float64]  # (k, 3) of length 1
     origins: NDArray[np.float64]  # (k, 3, 1 + m) as the centres
     moved: NDArray[np.bool_]  # (B, k) which bodies a joint moves
+    cylinders: NDArray[np.int64]  # (B,) axes as of KinematicModel.cylinder_axes
 
 
 def shape_of(model: KinematicModel, free: Sequence[Joint] = ()) -> Shape:
-    """Return the model's cuboids, transformation chain and free joints as arrays.
+    """Return the model's bodies, transformation chain and free joints as arrays.
 
     Parameters
     ----------
@@ -58,6 +59,7 @@ def shape_of(model: KinematicModel, free: Sequence[Joint] = ()) -> Shape:
         axes / np.linalg.norm(axes, axis=1, keepdims=True),
         np.array(origins).reshape(-1, 3, 1 + len(model.gamma)),
         np.array(moved, dtype=np.bool_).reshape(len(model.bodies), len(free)),
+        model.cylinder_axes,
     )
 
 

@@ -1,4 +1,4 @@
-"""The distances of the observed depths from the model's faces."""
+"""The distances of the observed depths from the model's faces, flat ones and sides of cylinders."""
 
 from __future__ import annotations
 
@@ -9,12 +9,23 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.model.parts import NO_AXIS
 from kmn_perception.refinement.correlation import newey_west_variance
+from kmn_perception.refinement.cylinders import (
+    SIDE_TERMS,
+    at_border_of_cylinder,
+    side_deviation,
+    side_point,
+    side_terms,
+)
 from kmn_perception.refinement.image import InverseDepthImage, Noise
 from kmn_perception.refinement.solids import (
+    AXIS,
     BOTTOM,
+    FACES,
     LEFT,
     RIGHT,
+    SIDE,
     TOP,
     gradient,
     inverse_depth_at,
@@ -73,9 +84,10 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
     """Compare pixels with the faces that their rays meet.
 
     The prediction q . (u, v, 1) is linear in the plane, so that all pixels of a face are summed up
-    in one moment matrix. Where the quantization of a sensor shifts whole rows or columns of a face
-    together, as the sums of their residuals show, the face loses weight accordingly; and however
-    many pixels show it, they tell no more of it than its shape allows.
+    in one moment matrix; likewise in the terms of a cylinder's side. Where the quantization of a
+    sensor shifts whole rows or columns of a face together, as the sums of their residuals show, the
+    face loses weight accordingly; and however many pixels show it, they tell no more of it than its
+    shape allows.
     """
     pixels = image.pixels
     height, width = image.inverse_depth.shape
@@ -85,9 +97,12 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
     deviations = _deviations(solids, sampling.noise)
     moments = np.zeros((bodies, 6, 3, 3))
     forces = np.zeros((bodies, 6, 3))
+    side_moments = np.zeros((bodies, SIDE_TERMS, SIDE_TERMS))
+    side_forces, terms = np.zeros((bodies, SIDE_TERMS)), np.zeros(SIDE_TERMS)
+    side_information = np.zeros(bodies)
     residuals = np.empty(pixels.shape[0] // sampling.stride + 1)
-    row_sums, column_sums = np.zeros((bodies, 6, height)), np.zeros((bodies, 6, width))
-    counts = np.zeros((bodies, 6), dtype=np.int64)
+    row_sums, column_sums = np.zeros((bodies, FACES, height)), np.zeros((bodies, FACES, width))
+    counts = np.zeros((bodies, FACES), dtype=np.int64)
     count = 0
     for i in range(0, pixels.shape[0], sampling.stride):
         u, v = float(pixels[i, 0]), float(pixels[i, 1])
@@ -95,20 +110,30 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
         if body < 0 or predicted > image.nearest or predicted < image.farthest:
             continue
         if sampling.border > 0.0 and (
-            _at_border(solids, borders, body, face, u, v, predicted)
+            _at_border(view, borders, body, face, u, v, predicted, sampling.border)
             or _beside_another(view, body, u, v, sampling.border)
         ):
             continue
-        residual = (pixels[i, 2] - predicted) / deviations[body, face]
+        if face == SIDE:
+            point = side_point(solids, body, u, v, predicted)
+            deviation = side_deviation(point, sampling.noise.depth, sampling.noise.lateral)
+            side_terms(point, predicted, terms)
+        else:
+            deviation = deviations[body, face]
+        residual = (pixels[i, 2] - predicted) / deviation
         residuals[count] = residual
         count += 1
         weight = 1.0 / (1.0 + (residual / robust) ** 2) ** 2
         row_sums[body, face, int(v)] += weight * residual
         column_sums[body, face, int(u)] += weight * residual
         counts[body, face] += 1
-        weight /= deviations[body, face]
+        weight /= deviation
         residual *= weight
-        weight /= deviations[body, face]
+        weight /= deviation
+        if face == SIDE:
+            side_information[body] += weight
+            _add_side(side_moments[body], side_forces[body], terms, weight, residual)
+            continue
         moments[body, face, 0, 0] += weight * u * u
         moments[body, face, 0, 1] += weight * u * v
         moments[body, face, 0, 2] += weight * u
@@ -131,7 +156,31 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
             inflation += sampling.shape_error**2 * moment[2, 2]
             jacobian = view.plane_jacobians[body, face]
             add_normal_equations(hessian, total, jacobian, moment / inflation, force / inflation)
+        if counts[body, SIDE] > 0:
+            rows = newey_west_variance(row_sums[body, SIDE], sampling.correlated_rows)
+            columns = newey_west_variance(column_sums[body, SIDE], sampling.correlated_rows)
+            number = counts[body, SIDE]
+            inflation = max(1.0, rows / number, columns / number)
+            inflation += sampling.shape_error**2 * side_information[body]
+            jacobian = view.side_jacobians[body]
+            hessian += jacobian.T @ (side_moments[body] / inflation) @ jacobian
+            total += jacobian.T @ (side_forces[body] / inflation)
     return PlaneTerms(hessian, total, residuals[:count])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_side(
+    moment: NDArray[np.float64],
+    force: NDArray[np.float64],
+    terms: NDArray[np.float64],
+    weight: float,
+    pull: float,
+) -> None:
+    """Add a pixel of a cylinder's side to its moments."""
+    for k in range(SIDE_TERMS):
+        force[k] -= pull * terms[k]
+        for c in range(SIDE_TERMS):
+            moment[k, c] += weight * terms[k] * terms[c]
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,15 +212,20 @@ def _borders(solids: NDArray[np.float64], border: float) -> NDArray[np.float64]:
 
 @njit(cache=True, error_model="numpy")
 def _at_border(
-    solids: NDArray[np.float64],
+    view: ModelView,
     borders: NDArray[np.float64],
     body: int,
     face: int,
     u: float,
     v: float,
     inverse_depth: float,
+    border: float,
 ) -> bool:
     """Return whether a pixel lies near the border of the face that it shows."""
+    solids = view.solids
+    if solids[body, AXIS] != NO_AXIS:
+        lines = view.lines[body]
+        return at_border_of_cylinder(solids, lines, body, face, u, v, inverse_depth, border)
     for other in range(6):
         if other != face:
             beyond = inverse_depth_at(solids, body, other, u, v)

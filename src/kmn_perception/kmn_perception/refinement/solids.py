@@ -2,18 +2,28 @@
 
 Each row of ``solids`` (B, SOLID) is a body: its bounding rectangle in the image (pixels), the
 planes q of its faces with inverse depth q . (u, v, 1), and for each face whether it faces the
-camera (1 or 0). The body is the intersection of the half spaces behind these planes.
+camera (1 or 0). A cuboid is the intersection of the half spaces behind these planes. Of a cylinder
+two of the faces are its ends; the seventh is its side, whose plane is that of the two limbs, where
+rays touch the side. Its row holds its axis, else `NO_AXIS`, and the map (3, 4) of homogeneous
+pixels to the unit cube: X = R P - b.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.model.parts import NO_AXIS
+
 LEFT, RIGHT, TOP, BOTTOM, PLANES = range(5)  # the first column of each part of a row
-FACES_CAMERA = PLANES + 6 * 3
-SOLID = FACES_CAMERA + 6  # number of columns
+SIDE, FACES = 6, 7
+FACES_CAMERA = PLANES + FACES * 3
+AXIS = FACES_CAMERA + FACES
+TO_UNIT = AXIS + 1
+SOLID = TO_UNIT + 12  # number of columns
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,8 +61,47 @@ def raycast(solids: NDArray[np.float64], body: int, u: float, v: float) -> tuple
         or v > solids[body, BOTTOM]
     ):
         return 0.0, -1
+    if solids[body, AXIS] != NO_AXIS:
+        return _raycast_cylinder(solids, body, u, v)
     enter, leave, entered = np.inf, 0.0, -1
     for face in range(6):
+        inverse_depth = inverse_depth_at(solids, body, face, u, v)
+        if not faces_camera(solids, body, face):
+            leave = max(leave, inverse_depth)
+        elif inverse_depth < enter:
+            enter, entered = inverse_depth, face
+    if entered < 0 or enter <= leave:
+        return 0.0, -1
+    return enter, entered
+
+
+@njit(cache=True, error_model="numpy")
+def _raycast_cylinder(
+    solids: NDArray[np.float64], body: int, u: float, v: float
+) -> tuple[float, int]:
+    """Return what `raycast` does of a cylinder, between its ends and within its side.
+
+    With X = a / w - b across the axis, the side is where ``|a - w b|^2 = w^2 / 4``.
+    """
+    axis = int(solids[body, AXIS])
+    square, product, rest = -0.25, 0.0, 0.0
+    for k in range(3):
+        if k != axis:
+            row = solids[body, TO_UNIT + 4 * k : TO_UNIT + 4 * k + 4]
+            ray = row[0] * u + row[1] * v + row[2]
+            square += row[3] * row[3]
+            product += ray * row[3]
+            rest += ray * ray
+    discriminant = product * product - square * rest
+    if discriminant < 0.0 or (square >= 0.0 and product <= 0.0):
+        return 0.0, -1
+    root = math.sqrt(discriminant)
+    enter, leave, entered = np.inf, 0.0, -1
+    if product + root > 0.0:  # else the ray is the axis
+        leave = rest / (product + root)
+    if faces_camera(solids, body, SIDE):
+        enter, entered = (product + root) / square, SIDE
+    for face in range(2 * axis, 2 * axis + 2):
         inverse_depth = inverse_depth_at(solids, body, face, u, v)
         if not faces_camera(solids, body, face):
             leave = max(leave, inverse_depth)

@@ -13,8 +13,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kmn_perception.model.parts import NO_AXIS
+from kmn_perception.refinement.cylinders import SIDE_TERMS, see_side, silhouette_segments
 from kmn_perception.refinement.geometry import Shape, cuboids
+from kmn_perception.refinement.lines import MIN_DEPTH, ends_in_view, line_jacobian, touches
 from kmn_perception.refinement.solids import (
+    AXIS,
     BOTTOM,
     FACES_CAMERA,
     LEFT,
@@ -25,7 +29,6 @@ from kmn_perception.refinement.solids import (
     faces_camera,
 )
 
-MIN_DEPTH = 1e-3  # metres in front of the camera; edges are clipped there
 MIN_CREASE = 1e-9  # pixels; it is not 0, which stands for a step
 MIN_OFFSET = 1e-9  # of the camera from a face's plane, in sizes of the body
 
@@ -33,7 +36,8 @@ MIN_OFFSET = 1e-9  # of the camera from a face's plane, in sizes of the body
 class ModelView(NamedTuple):
     """The model as a camera sees it; P parameters, faces and edges numbered within each body.
 
-    Face ``2 * axis`` is at -1/2 along the unit cube's axis, ``2 * axis + 1`` at +1/2.
+    Face ``2 * axis`` is at -1/2 along the unit cube's axis, ``2 * axis + 1`` at +1/2. The edges of
+    a cylinder are its limbs, the first two, and chords of its rims.
 
     Attributes
     ----------
@@ -41,6 +45,8 @@ class ModelView(NamedTuple):
         (B, SOLID) the bodies for raycasts, see `solids`.
     plane_jacobians
         (B, 6, 3, P) derivatives of the planes q.
+    side_jacobians
+        (B, 7, P) derivatives of the sides of cylinders, see `side_terms`.
     lines
         (B, 12, 3) l of the silhouette's edges: l . (u, v, 1) is the distance of a pixel to the
         edge, in pixels, positive inside.
@@ -59,6 +65,7 @@ class ModelView(NamedTuple):
 
     solids: NDArray[np.float64]
     plane_jacobians: NDArray[np.float64]
+    side_jacobians: NDArray[np.float64]
     lines: NDArray[np.float64]
     line_jacobians: NDArray[np.float64]
     ends: NDArray[np.float64]
@@ -89,6 +96,7 @@ def model_view(
     view = ModelView(
         np.zeros((bodies, SOLID)),
         np.zeros((bodies, 6, 3, parameters)),
+        np.zeros((bodies, SIDE_TERMS, parameters)),
         np.zeros((bodies, 12, 3)),
         np.zeros((bodies, 12, 3, parameters)),
         np.zeros((bodies, 12, 4)),
@@ -102,11 +110,17 @@ def model_view(
             for k in range(3):
                 cube[row] += projection[row, k] * cubes[body, k]
                 jacobian[row] += projection[row, k] * cube_jacobians[body, k]
+        view.solids[body, AXIS] = NO_AXIS
         _see_faces(view, body, cube, jacobian)
-        touching = np.zeros(12, dtype=np.bool_)
-        for edge in range(12):
-            touching[edge] = _touches(cubes, body, edge, contact)
-        _see_edges(view, body, cube, jacobian, touching, max_relief)
+        if shape.cylinders[body] != NO_AXIS:
+            axis = shape.cylinders[body]
+            see_side(view.solids[body], view.side_jacobians[body], axis, cube, jacobian)
+            _see_outline(view, body, cube, jacobian)
+        else:
+            touching = np.zeros(12, dtype=np.bool_)
+            for edge in range(12):
+                touching[edge] = touches(cubes, shape.cylinders, body, edge, contact)
+            _see_edges(view, body, cube, jacobian, touching, max_relief)
         _bound(view.solids[body], cube)
     return view
 
@@ -180,7 +194,7 @@ def _see_edges(
             jacobian[:, 3] + at_first * jacobian[:, first] + at_second * jacobian[:, second]
         )
         direction, direction_jacobian = cube[:, axis], jacobian[:, axis]
-        if not _ends(view.ends[body, edge], start, direction):
+        if not ends_in_view(view.ends[body, edge], start, direction):
             continue
         line = np.cross(start, direction)
         length = np.hypot(line[0], line[1])
@@ -192,60 +206,44 @@ def _see_edges(
             view.creases[body, edge] = max(abs((line * end).sum() / end[2]), MIN_CREASE)
         view.lines[body, edge] = line
         view.faces[body, edge] = face
-        for i in range(jacobian.shape[2]):
-            derivative = np.cross(start_jacobian[:, i], direction) + np.cross(
-                start, direction_jacobian[:, i]
-            )
-            derivative /= length
-            stretch = line[0] * derivative[0] + line[1] * derivative[1]
-            view.line_jacobians[body, edge, :, i] = derivative - stretch * line
+        line_jacobian(
+            view.line_jacobians[body, edge],
+            line,
+            length,
+            (start, direction),
+            (start_jacobian, direction_jacobian),
+        )
 
 
 @njit(cache=True, error_model="numpy")
-def _touches(cubes: NDArray[np.float64], body: int, edge: int, contact: float) -> bool:
-    """Return whether the middle of an edge is in, or within ``contact`` metres of, another body."""
-    axis = edge // 4
-    middle = cubes[body, :, 3].copy()
-    middle += ((edge // 2) % 2 - 0.5) * cubes[body, :, (axis + 1) % 3]
-    middle += (edge % 2 - 0.5) * cubes[body, :, (axis + 2) % 3]
-    for other in range(cubes.shape[0]):
-        if other == body:
-            continue
-        outside = -np.inf
+def _see_outline(
+    view: ModelView, body: int, cube: NDArray[np.float64], jacobian: NDArray[np.float64]
+) -> None:
+    """Fill in the silhouette of a cylinder, all of which is fixed to it as far as it moves."""
+    for edge, segment in silhouette_segments(view.solids, body, cube):
+        start, direction = cube[:, 3].copy(), np.zeros(3)
+        start_jacobian, direction_jacobian = jacobian[:, 3].copy(), np.zeros_like(jacobian[:, 3])
         for k in range(3):
-            side = cubes[other, :, k]
-            length = np.sqrt((side * side).sum())
-            along = abs((side * (middle - cubes[other, :, 3])).sum()) / length
-            outside = max(outside, along - 0.5 * length)
-        if outside <= contact:
-            return True
-    return False
-
-
-@njit(cache=True, error_model="numpy")
-def _ends(
-    ends: NDArray[np.float64], start: NDArray[np.float64], direction: NDArray[np.float64]
-) -> bool:
-    """Fill in the ends in the image of the part of an edge that is in front of the camera.
-
-    Return whether there is such a part.
-    """
-    low, high = -0.5, 0.5
-    if direction[2] != 0.0:
-        crossing = (MIN_DEPTH - start[2]) / direction[2]
-        if direction[2] > 0.0:
-            low = max(low, crossing)
-        else:
-            high = min(high, crossing)
-    elif start[2] < MIN_DEPTH:
-        return False
-    if low >= high:
-        return False
-    for k in range(2):
-        point = start + (low if k == 0 else high) * direction
-        ends[2 * k] = point[0] / point[2]
-        ends[2 * k + 1] = point[1] / point[2]
-    return True
+            start += segment.middle[k] * cube[:, k]
+            direction += segment.length[k] * cube[:, k]
+            start_jacobian += segment.middle[k] * jacobian[:, k]
+            direction_jacobian += segment.length[k] * jacobian[:, k]
+        if not ends_in_view(view.ends[body, edge], start, direction):
+            continue
+        line = np.cross(start, direction)
+        length = np.hypot(line[0], line[1])
+        if (line * cube[:, 3]).sum() < 0.0:
+            length = -length
+        line /= length
+        view.lines[body, edge] = line
+        view.faces[body, edge] = segment.face
+        line_jacobian(
+            view.line_jacobians[body, edge],
+            line,
+            length,
+            (start, direction),
+            (start_jacobian, direction_jacobian),
+        )
 
 
 @njit(cache=True, error_model="numpy")

@@ -91,7 +91,7 @@ def observe(
     positions
         Of its joints by their names, rad or m; 0 of those that are not named.
     """
-    depth = render(model.moved_cubes(values, positions or {}), camera)
+    depth = render(model.moved_cubes(values, positions or {}), camera, model.cylinder_axes)
     return Observation(depth_to_cloud(add_noise(depth, noise, generator), camera), camera)
 
 
@@ -103,7 +103,7 @@ def _observe_from_around(
 ) -> Observation:
     cubes = model.unit_cubes(*model.split(values))
     camera = _place(_camera(sensor.camera), cubes[:, :3, 3].mean(axis=0), model, sensor, generator)
-    depth = add_noise(render(cubes, camera), sensor.noise, generator)
+    depth = add_noise(render(cubes, camera, model.cylinder_axes), sensor.noise, generator)
     free = np.full_like(depth, EMPTY)
     if generator.uniform() < sensor.holes:
         measured = np.isfinite(depth)

@@ -25,7 +25,7 @@ from kmn_perception.viewer.inputs import Inputs, NewestOnly
 from kmn_perception.viewer.objects_view import Perceived
 from kmn_perception.viewer.shapes import corners
 from kmn_perception.viewer.viewer_parameters import ViewerSettings
-from kmn_perception.visualization.overlay import ACCEPTED, REFUSED, wireframe
+from kmn_perception.visualization.overlay import ACCEPTED, REFUSED, Bodies, wireframe
 
 INFO, POINTS = "depth/camera_info", "points"
 FRUSTUM = 0.25  # metres
@@ -171,9 +171,9 @@ def picture(
     """Return the colour image, or else the depth (height, width), with edges of the objects."""
     shown = depth_colours(depth) if colours is None else colours.copy()
     front = [each for each in objects if _in_front(each, camera)]
-    everything = np.concatenate([np.empty((0, 4, 4)), *(each.cubes for each in front)])
+    everything = Bodies.together(Bodies(each.cubes, each.axes) for each in front)
     for each in front:
-        visible, _ = wireframe(each.cubes, camera, everything)
+        visible, _ = wireframe(Bodies(each.cubes, each.axes), camera, everything)
         paint = colour(ACCEPTED if each.holds else REFUSED)
         lines = np.clip(visible, -1e4, 1e4).round().astype(np.int32)
         cv2.polylines(shown, list(lines), False, paint, LINE, cv2.LINE_AA)

@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from kmn_perception.model.rotation import quaternion_from_matrix
-from kmn_perception.viewer.shapes import Cubes, edges, triangles
+from kmn_perception.viewer.shapes import Axes, Cubes, edges, triangles
 
 Rgb = tuple[int, int, int]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # the quaternion w, x, y, z that turns nothing
@@ -40,13 +40,25 @@ class Drawing:
         self._nodes: dict[str, Any] = {}
         self._drawn: dict[str, tuple[Any, ...]] = {}
 
-    def cuboids(
-        self, name: str, cubes: Cubes, paint: Rgb, opacity: float, line: float = 0.006
+    def bodies(
+        self,
+        name: str,
+        cubes: Cubes,
+        axes: Axes,
+        paint: Rgb,
+        opacity: float,
+        line: float = 0.006,
     ) -> None:
-        """Draw cuboids (B, 4, 4) with their edges, which are lines of a width in metres."""
-        if self._is_drawn(name, cubes, paint, opacity):
+        """Draw cuboids (B, 4, 4), those with axes (B,) as cylinders, with their edges.
+
+        Parameters
+        ----------
+        line
+            Width of the edges, metres.
+        """
+        if self._is_drawn(name, cubes, axes.tolist(), paint, opacity):
             return
-        vertices, faces = triangles(cubes)
+        vertices, faces = triangles(cubes, axes)
         self._nodes[name] = self._scene.add_mesh_simple(
             f"{self._root}/{name}",
             vertices.astype(np.float32),
@@ -59,7 +71,10 @@ class Drawing:
             receive_shadow=False,
         )
         self._scene.add_line_segments(  # goes with what it is below
-            f"{self._root}/{name}/edges", edges(cubes).astype(np.float32), paint, thickness=line
+            f"{self._root}/{name}/edges",
+            edges(cubes, axes).astype(np.float32),
+            paint,
+            thickness=line,
         )
 
     def label(self, name: str, text: str, place: NDArray[np.float64]) -> None:

@@ -53,8 +53,9 @@ class MorphingPanel:
         count = len(model.parameters)
         positions = dict(zip(list(self._sliders)[count:], places[count:], strict=True))
         cubes = model.moved_cubes(np.array(places[:count]), positions)
-        self._drawing.cuboids("prototype", model.prototype_cubes, colour(SCENE), FAINT)
-        self._drawing.cuboids("morphed", cubes, colour(OBJECT), SOLID)
+        prototype, axes = model.prototype_cubes, model.cylinder_axes
+        self._drawing.bodies("prototype", prototype, axes, colour(SCENE), FAINT)
+        self._drawing.bodies("morphed", cubes, axes, colour(OBJECT), SOLID)
 
     def _choose(self, name: str) -> None:
         """Make the sliders of a model."""

@@ -18,12 +18,13 @@ from kmn_perception.model.room_model import HINGE, RoomModel, has_surroundings
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.viewer.controls import write
 from kmn_perception.viewer.drawing import Drawing, colour, plain
-from kmn_perception.viewer.shapes import Cubes, corners, uncertain_shapes
+from kmn_perception.viewer.shapes import Axes, Cubes, corners, uncertain_shapes
 from kmn_perception.viewer.viewer_parameters import DrawingSettings
 from kmn_perception.visualization.overlay import ACCEPTED, REFERENCE, REFUSED
 
 HOLDS = (Status.OK, Status.HANDLE_NOT_SEEN)
 SOLID, FAINT, UNCERTAIN = 0.55, 0.2, 0.12  # opacities
+NO_AXES = np.empty(0, dtype=np.int64)
 
 
 class Models:
@@ -69,6 +70,8 @@ class Perceived(NamedTuple):
         (n + m,) parameters.
     cubes
         (B, 4, 4) its bodies in the world; B = 0 where there is no estimate.
+    axes
+        (B,) of those that are cylinders, see `KinematicModel.cylinder_axes`.
     uncertain
         How it may look otherwise, see `uncertain_shapes`.
     """
@@ -76,6 +79,7 @@ class Perceived(NamedTuple):
     message: MorphingParameters
     values: NDArray[np.float64]
     cubes: Cubes
+    axes: Axes
     uncertain: list[Cubes]
 
     @property
@@ -113,7 +117,7 @@ def read_object(
     """
     values = np.array([*message.theta, *message.gamma], dtype=np.float64)
     if not np.isfinite(values).all() or not len(values):
-        return Perceived(message, values, np.empty((0, 4, 4)), [])
+        return Perceived(message, values, np.empty((0, 4, 4)), NO_AXES, [])
     model = models.load(message.model)
     names = [parameter.name for parameter in model.parameters]
     if [*message.theta_names, *message.gamma_names] != names or len(values) != len(names):
@@ -129,7 +133,8 @@ def read_object(
         uncertain = uncertain_shapes(
             bodies, values, covariance, model.limits, settings.deviations, settings.min_extent
         )
-    return Perceived(message, values, pose @ bodies(values), [pose @ each for each in uncertain])
+    cubes, axes = pose @ bodies(values), model.axes_among(len(bodies(values)))
+    return Perceived(message, values, cubes, axes, [pose @ each for each in uncertain])
 
 
 class ObjectsView:
@@ -152,14 +157,16 @@ class ObjectsView:
                 continue
             paint = colour(ACCEPTED if found.holds else REFUSED)
             name, label = f"object {number}", f"label {number}"
-            self._drawing.cuboids(name, found.cubes, paint, SOLID if found.holds else FAINT)
+            opacity = SOLID if found.holds else FAINT
+            self._drawing.bodies(name, found.cubes, found.axes, paint, opacity)
             everything = corners(found.cubes).reshape(-1, 3)
             top = np.array([*everything[:, :2].mean(axis=0), everything[:, 2].max() + 0.1])
             self._drawing.label(label, found.text, top)
             names |= {name, label}
             for direction, cubes in enumerate(found.uncertain):
                 name = f"uncertain {number} {direction}"
-                self._drawing.cuboids(name, cubes, colour(REFERENCE), UNCERTAIN, 0.003)
+                paint = colour(REFERENCE)
+                self._drawing.bodies(name, cubes, found.axes, paint, UNCERTAIN, 0.003)
                 names.add(name)
         self._drawing.keep(names)
         write(self._text, "\n\n".join(map(_told, objects)) or "nothing was told yet")

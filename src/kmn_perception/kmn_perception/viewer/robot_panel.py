@@ -121,4 +121,5 @@ class RobotPanel:
             found = self._planned_for
             model = self._models.load(found.message.model)
             cubes = model.moved_cubes(found.values, positions)
-            self._ghost_object.cuboids("door", cubes, colour(OBJECT), GHOST)
+            axes = model.cylinder_axes
+            self._ghost_object.bodies("door", cubes, axes, colour(OBJECT), GHOST)

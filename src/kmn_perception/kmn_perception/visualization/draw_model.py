@@ -39,8 +39,9 @@ def _view(
     model: KinematicModel, values: NDArray[np.float64], positions: Mapping[str, float], title: str
 ) -> Overlay:
     cubes = model.moved_cubes(values, positions)
-    depth, camera = render(cubes, model.camera), model.camera
-    shown = ShownObject(depth_to_cloud(depth, camera), cubes, accepted=True)
+    depth, camera = render(cubes, model.camera, model.cylinder_axes), model.camera
+    points = depth_to_cloud(depth, camera)
+    shown = ShownObject(points, cubes, accepted=True, axes=model.cylinder_axes)
     return Overlay(depth, camera, [shown], title)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from tqdm import tqdm
 
 from kmn_perception.configuration.output import replacing
 from kmn_perception.model.camera import Camera
+from kmn_perception.model.parts import NO_AXIS
 from kmn_perception.model.rendering import depth_to_points
 from kmn_perception.model.transformation import transform_points
 
@@ -36,6 +38,24 @@ CUBE_CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)), dtype=np.float32)
 CUBE_EDGES = [(a, b) for a, b in combinations(CUBE_CORNERS, 2) if np.abs(a - b).sum() == 1.0]
 
 
+class Bodies(NamedTuple):
+    """Bodies as maps (B, 4, 4) of the unit cube, and the axes (B,) of those that are cylinders."""
+
+    cubes: NDArray[np.float64]
+    axes: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, cubes: NDArray[np.float64], axes: NDArray[np.int64] | None = None) -> Bodies:
+        """Return bodies, which are cuboids without axes."""
+        return cls(cubes, np.full(len(cubes), NO_AXIS) if axes is None else axes)
+
+    @classmethod
+    def together(cls, all_bodies: Iterable[Bodies]) -> Bodies:
+        """Return several of them as one."""
+        cubes, axes = zip(cls.of(np.empty((0, 4, 4))), *all_bodies, strict=True)
+        return cls(np.concatenate(cubes), np.concatenate(axes))
+
+
 @dataclass(frozen=True, eq=False)
 class ShownObject:
     """An object of a picture.
@@ -48,11 +68,20 @@ class ShownObject:
         (B, 4, 4) bodies of the predicted model; B = 0 if there is no prediction.
     accepted
         Whether the prediction is valid: drawn green, else red.
+    axes
+        (B,) of those that are cylinders, as ``KinematicModel.cylinder_axes``; without them, all
+        are cuboids.
     """
 
     points: NDArray[np.float32]
     unit_cubes: NDArray[np.float64]
     accepted: bool
+    axes: NDArray[np.int64] | None = None
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies of the predicted model."""
+        return Bodies.of(self.unit_cubes, self.axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +141,13 @@ def save_contact_sheet(path: Path, overlays: Sequence[Overlay]) -> None:
 
 def _draw(axes: Axes, overlay: Overlay, line_width: float, font_size: float) -> None:
     axes.imshow(_shaded(overlay))
-    everything = np.concatenate([np.empty((0, 4, 4)), *[o.unit_cubes for o in overlay.objects]])
+    everything = Bodies.together(shown.bodies for shown in overlay.objects)
     for shown in overlay.objects:
         colour = ACCEPTED if shown.accepted else REFUSED
-        visible, hidden = wireframe(shown.unit_cubes, overlay.camera, everything)
+        visible, hidden = wireframe(shown.bodies, overlay.camera, everything)
         _add_lines(axes, hidden, colour, HIDDEN_WIDTH * line_width)
         _add_lines(axes, visible, colour, line_width)
-    visible, _ = wireframe(overlay.references, overlay.camera)
+    visible, _ = wireframe(Bodies.of(overlay.references), overlay.camera)
     _add_lines(axes, visible, REFERENCE, HIDDEN_WIDTH * line_width)
     axes.set(xlim=(-0.5, overlay.camera.width - 0.5), ylim=(overlay.camera.height - 0.5, -0.5))
     axes.set_title(overlay.title, fontsize=font_size)
@@ -154,47 +183,77 @@ def _facing(depth: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
 
 
 def wireframe(
-    unit_cubes: NDArray[np.float64],
-    camera: Camera,
-    occluders: NDArray[np.float64] | None = None,
+    bodies: Bodies, camera: Camera, occluders: Bodies | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the visible and the hidden pieces of the bodies' edges.
+    """Return the visible and the hidden pieces of the bodies' edges; of cylinders, also the limbs.
 
     Parameters
     ----------
-    unit_cubes
-        (B, 4, 4) maps of the unit cube to the world, metres.
     occluders
-        (C, 4, 4) of all that can hide them; default: themselves.
+        All that can hide them; default: themselves.
 
     Returns
     -------
     visible, hidden
         (L, 2, 2) lines from pixel to pixel.
     """
-    along = np.linspace(0.0, 1.0, EDGE_PIECES + 1, dtype=np.float32)[:, None]
     edges = [
-        transform_points(cube, a + along * (b - a)) for cube in unit_cubes for a, b in CUBE_EDGES
+        transform_points(cube, line)
+        for cube, axis in zip(*bodies, strict=True)
+        for line in _unit_edges(cube, axis, camera)
     ]
     points = np.reshape(edges, (-1, EDGE_PIECES + 1, 3))
     middles = 0.5 * (points[:, 1:] + points[:, :-1])
     hidden = np.zeros(middles.shape[:2], dtype=bool)
-    for cube in unit_cubes if occluders is None else occluders:
-        hidden |= _covers(cube, camera, middles)
+    for cube, axis in zip(*(bodies if occluders is None else occluders), strict=True):
+        hidden |= _covers(cube, axis, camera, middles)
     pixels = camera.project(points)[..., :2].astype(np.float32)
     lines = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)
     return lines[~hidden], lines[hidden]
 
 
+def _unit_edges(cube: NDArray[np.float64], axis: int, camera: Camera) -> list[NDArray[np.float32]]:
+    """Return the lines (EDGE_PIECES + 1, 3) of a body in its unit cube."""
+    along = np.linspace(0.0, 1.0, EDGE_PIECES + 1, dtype=np.float32)[:, None]
+    if axis == NO_AXIS:
+        return [a + along * (b - a) for a, b in CUBE_EDGES]
+    ends = np.eye(3, dtype=np.float32)[axis] * np.array([[-0.5], [0.5]], dtype=np.float32)
+    lines = [end + unit_circle(2.0 * np.pi * along[:, 0], axis) for end in ends]
+    eye = (np.linalg.inv(cube) @ camera.pose[:, 3])[[(axis + 1) % 3, (axis + 2) % 3]]
+    distance = float(np.linalg.norm(eye))
+    if distance > 0.5:  # else the side is not seen, and has no limbs
+        half = np.arccos(0.5 / distance)
+        angles = np.arctan2(eye[1], eye[0]) + np.array([-half, half])
+        feet = unit_circle(angles, axis) + ends[0]
+        lines += [foot + along * (ends[1] - ends[0]) for foot in feet]
+    return lines
+
+
+def unit_circle(angles: NDArray[np.floating], axis: int) -> NDArray[np.float32]:
+    """Return the points (N, 3) at angles (N,) of a circle of diameter 1 about an axis."""
+    points = np.zeros((len(angles), 3), dtype=np.float32)
+    points[:, (axis + 1) % 3], points[:, (axis + 2) % 3] = np.cos(angles) / 2, np.sin(angles) / 2
+    return points
+
+
 def _covers(
-    cube: NDArray[np.float64], camera: Camera, points: NDArray[np.float32]
+    cube: NDArray[np.float64], axis: int, camera: Camera, points: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
     """Tell whether a body stands between the camera and each of the points (..., 3)."""
     to_cube = np.linalg.inv(cube).astype(np.float64)
     eye = transform_points(to_cube, camera.position.astype(np.float32))
     rays = transform_points(to_cube, points) - eye
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         first, second = (-0.5 - eye) / rays, (0.5 - eye) / rays
+        if axis != NO_AXIS:
+            across = np.arange(3) != axis
+            square, product = (rays[..., across] ** 2).sum(-1), rays[..., across] @ eye[across]
+            root = np.sqrt(product**2 - square * (eye[across] @ eye[across] - 0.25))
+            round_ends = (-product - root) / square, (-product + root) / square  # NaN: beside it
+            first, second = (
+                np.stack([flat[..., axis], side], axis=-1)
+                for flat, side in zip((first, second), round_ends, strict=True)
+            )
     enter = np.minimum(first, second).max(axis=-1)
     leave = np.maximum(first, second).min(axis=-1)
     covered: NDArray[np.bool_] = (enter < np.minimum(leave, 1.0) - SURFACE) & (leave > 0.0)

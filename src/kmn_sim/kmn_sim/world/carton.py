@@ -24,6 +24,7 @@ class Carton:
 
     def __init__(self, physics: Any, scenario: Scenario, settings: CartonSettings) -> None:
         self._physics, self._scenario = physics, scenario
+        scenario.model.require_cuboids("the simulator, of what has no joints,")
         cube = scenario.model.unit_cubes(scenario.theta, scenario.gamma)[0]
         size = np.linalg.norm(cube[:3, :3], axis=0)
         half = (size / 2.0).tolist()

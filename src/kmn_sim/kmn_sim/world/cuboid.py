@@ -7,17 +7,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kmn_perception.model.parts import NO_AXIS
+
 Colour = tuple[float, ...]  # RGBA
 Three = tuple[float, float, float]
 MATT = (0.0, 0.0, 0.0)  # what surfaces reflect of the light itself, RGB
 
 
 class Cuboid(NamedTuple):
-    """An axis-parallel cuboid in the frame of its link: centre and size (3,) in m, colour RGBA."""
+    """An axis-parallel cuboid in the frame of its link: centre and size (3,) in m, colour RGBA.
+
+    With an ``axis``, it is the cylinder along it that the cuboid holds, see `Body`.
+    """
 
     centre: NDArray[np.float64]
     size: NDArray[np.float64]
     colour: Colour
+    axis: int = NO_AXIS
 
     def unit_cube(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the map (4, 4) of the unit cube to the world, where the link has a pose (4, 4)."""

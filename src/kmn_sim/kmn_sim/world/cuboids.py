@@ -31,7 +31,7 @@ def object_cuboids(scenario: Scenario, settings: DoorSurroundings) -> dict[str, 
     for body in scenario.model.bodies:
         link = body.name if body.name in moved else WORLD
         colour = colours.get(body.name, PANEL if link != WORLD else CARCASS)
-        links[link].append(cuboid(body.centre(gamma), body.size(gamma), colour))
+        links[link].append(Cuboid(body.centre(gamma), body.size(gamma), colour, body.axis))
     stem = scenario.model.stem
     if scenario.stem and stem is not None:
         links[stem.body.name].append(cuboid(*stem.cuboid(gamma), HANDLE))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model import urdf_elements as urdf
-from kmn_perception.model.parts import WORLD
+from kmn_perception.model.parts import NO_AXIS, WORLD
 from kmn_sim.world.cuboid import MATT, Cuboid
 from kmn_sim.world.scenario import Scenario
 
@@ -52,15 +52,23 @@ def _link(
     if mass > 0.0:
         body = cuboids[0]
         ElementTree.SubElement(inertial, "origin", xyz=urdf.numbers(body.centre - origin))
-        x, y, z = mass / 12.0 * (np.sum(body.size**2) - body.size**2)
+        x, y, z = mass * _squared_radii(body)
     ElementTree.SubElement(
         inertial, "inertia", ixx=f"{x}", iyy=f"{y}", izz=f"{z}", ixy="0", ixz="0", iyz="0"
     )
     for number, cuboid in enumerate(cuboids):
         for kind in ("visual", "collision"):
-            element = urdf.add_box(link, kind, cuboid.centre - origin, cuboid.size)
+            element = urdf.add_solid(link, kind, cuboid.centre - origin, cuboid.size, cuboid.axis)
             if kind == "visual":
                 material = ElementTree.SubElement(element, "material", name=f"{name}_{number}")
                 ElementTree.SubElement(material, "color", rgba=urdf.numbers(cuboid.colour))
                 ElementTree.SubElement(material, "specular", rgb=urdf.numbers(MATT))
     return link
+
+
+def _squared_radii(body: Cuboid) -> NDArray[np.float64]:
+    """Return the squares (3,) of a homogeneous body's radii of gyration about x, y, z; m^2."""
+    spread = body.size**2 / 12.0  # along each axis
+    if body.axis != NO_AXIS:
+        spread = np.where(np.arange(3) == body.axis, spread, body.size**2 / 16.0)
+    return np.asarray(np.sum(spread) - spread)

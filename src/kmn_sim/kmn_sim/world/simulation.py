@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.configuration.robot_parts import velocity_controller
+from kmn_perception.model.parts import NO_AXIS
 from kmn_sim.control.interpolation import State
 from kmn_sim.control.robot_controllers import RobotControllers
 from kmn_sim.control.velocity_controller import VelocityController
@@ -167,7 +168,7 @@ class Simulation:
         return self.carton.values()
 
     def unit_cubes(self) -> NDArray[np.float64]:
-        """Return all cuboids but the robot as maps (B, 4, 4) of the unit cube, closed."""
+        """Return all bodies but the robot as maps (B, 4, 4) of the unit cube, closed."""
         scenario = self.scenario
         cubes = list(scenario.model.unit_cubes(*scenario.model.split(self.values())))
         if scenario.is_articulated:
@@ -176,6 +177,15 @@ class Simulation:
             cubes = [part.unit_cube(pose) for part in parts]
         around = [*self._table(), *self._ground()]
         return np.array([*cubes, *(part.unit_cube(np.eye(4)) for part in around)])
+
+    def cylinder_axes(self) -> NDArray[np.int64]:
+        """Return which of these cuboids (B,) hold cylinders, see `KinematicModel.cylinder_axes`."""
+        axes = self.scenario.model.cylinder_axes
+        if self.scenario.is_articulated:
+            parts = chain(*object_cuboids(self.scenario, self.settings.door).values())
+            axes = np.array([part.axis for part in parts])
+        around = len(self._table()) + len(self._ground())
+        return np.append(axes, np.full(around, NO_AXIS))
 
     def close(self) -> None:
         """End the physics engine."""

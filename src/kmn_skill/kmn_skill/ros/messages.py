@@ -19,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from kmn_msgs.msg import MorphingParameters
 from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.messages import MessageError, cube_marker
+from kmn_perception.ros.messages import MessageError, body_marker
 from kmn_perception.ros.stamps import duration_of, seconds, stamp_of
 from kmn_skill.execution.base_motion import Motion
 from kmn_skill.execution.door_observation import DoorObservation
@@ -217,8 +217,8 @@ def markers_from_plan(
         _line(header, "base", base, BASE_COLOUR),
         _line(header, "handle", levers, HANDLE_COLOUR),
     ]
-    for number, cube in enumerate(cubes[-1]):
-        markers.append(cube_marker("door", number, cube, DOOR_COLOUR, header))
+    for number, (cube, axis) in enumerate(zip(cubes[-1], model.cylinder_axes, strict=True)):
+        markers.append(body_marker("door", number, cube, DOOR_COLOUR, header, int(axis)))
     return MarkerArray(markers=markers)
 
 

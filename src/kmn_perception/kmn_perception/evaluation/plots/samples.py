@@ -60,8 +60,13 @@ def _draw(
     inverse = model.transformation.inverse(theta)
     depth = point_cloud_to_depth(drawn, observation.points, inverse)
     axes.imshow(np.where(depth > 0.0, depth, np.nan), cmap="viridis")
-    for cube in model.unit_cubes(np.zeros_like(theta), gamma):
-        silhouette = render(cube[None], model.camera.resized(WIDTH, HEIGHT))
+    cubes, camera = (
+        model.unit_cubes(np.zeros_like(theta), gamma),
+        model.camera.resized(WIDTH, HEIGHT),
+    )
+    for body in range(len(cubes)):
+        alone = slice(body, body + 1)
+        silhouette = render(cubes[alone], camera, model.cylinder_axes[alone])
         axes.contour(np.isfinite(silhouette), levels=[0.5], colors="#d01c1c", linewidths=0.9)
     axes.set(xticks=[], yticks=[], facecolor="#f2f2f2")
     axes.grid(False)

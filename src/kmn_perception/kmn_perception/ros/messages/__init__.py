@@ -13,7 +13,7 @@ from kmn_perception.ros.messages.reading import (
     view_from_image,
 )
 from kmn_perception.ros.messages.results import (
-    cube_marker,
+    body_marker,
     markers_from_estimates,
     parameters_from_estimate,
 )
@@ -28,7 +28,7 @@ __all__ = [
     "MessageError",
     "camera_from_info",
     "cloud_from_points",
-    "cube_marker",
+    "body_marker",
     "depth_from_image",
     "image_from_depth",
     "info_from_camera",

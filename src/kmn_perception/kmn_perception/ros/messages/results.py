@@ -12,6 +12,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.parts import NO_AXIS
 from kmn_perception.model.rotation import quaternion_from_matrix
 
 if TYPE_CHECKING:  # the estimator brings torch, which those who only read clouds do not need
@@ -68,7 +69,7 @@ def parameters_from_estimate(
 def markers_from_estimates(
     objects: Sequence[tuple[Estimate, NDArray[np.float64]]], header: Header
 ) -> MarkerArray:
-    """Draw the bodies of the estimated models as cubes, which replace all former ones.
+    """Draw the bodies of the estimated models, which replace all former ones.
 
     They are green where the parameters hold, else red; there is none of a body without a size.
 
@@ -81,18 +82,27 @@ def markers_from_estimates(
     for estimate, cubes in objects:
         holds = estimate.status in (MorphingParameters.OK, MorphingParameters.HANDLE_NOT_SEEN)
         colour = VALID_COLOUR if holds else INVALID_COLOUR
-        for cube in cubes:
+        axes = estimate.model.axes_among(len(cubes)).tolist()
+        for cube, axis in zip(cubes, axes, strict=True):
             if cube[:3, :3].any(axis=0).all():
-                number = len(markers) - 1
-                markers.append(cube_marker(estimate.model.name, number, cube, colour, header))
+                name, number = estimate.model.name, len(markers) - 1
+                markers.append(body_marker(name, number, cube, colour, header, axis))
     return MarkerArray(markers=markers)
 
 
-def cube_marker(
-    namespace: str, number: int, cube: NDArray[np.float64], colour: ColorRGBA, header: Header
+def body_marker(
+    namespace: str,
+    number: int,
+    cube: NDArray[np.float64],
+    colour: ColorRGBA,
+    header: Header,
+    axis: int = NO_AXIS,
 ) -> Marker:
-    """Draw a unit cube's map (4, 4) as a cube."""
+    """Draw a unit cube's map (4, 4) as a cube, or as the cylinder along an axis that it holds."""
     marker = Marker(header=header, ns=namespace, id=number, type=Marker.CUBE, action=Marker.ADD)
+    if axis != NO_AXIS:
+        marker.type = Marker.CYLINDER
+        cube = cube[:, [(axis + 1) % 3, (axis + 2) % 3, axis, 3]]  # along the marker's z
     size = np.linalg.norm(cube[:3, :3], axis=0)
     x, y, z, w = quaternion_from_matrix(cube[:3, :3] / size).tolist()
     marker.pose.position = Point(**dict(zip("xyz", cube[:3, 3].tolist(), strict=True)))

@@ -24,7 +24,8 @@ RADIUS, LENGTH = 0.03, 0.3
 def within_a_pixel(seen: NDArray[np.float32], exact: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Tell where a depth is between those of the exact image in and around a pixel."""
     around = sliding_window_view(np.pad(exact, 1, constant_values=np.nan), (3, 3))
-    low, high = np.nanmin(around, axis=(2, 3)), np.nanmax(around, axis=(2, 3))
+    low = np.nan_to_num(around, nan=np.inf).min(axis=(2, 3))
+    high = np.nan_to_num(around, nan=-np.inf).max(axis=(2, 3))
     return np.asarray((low - ROUNDING <= seen) & (seen <= high + ROUNDING))
 
 
@@ -43,7 +44,7 @@ def test_a_round_bar_is_seen_as_it_is_rendered(
     alone = slice(number, number + 1)
     bar_seen = np.isfinite(render(cubes[alone], model.camera, axes[alone]))
     bar_seen &= exact == render(cubes[alone], model.camera, axes[alone])
-    assert bar_seen.sum() > 500
+    assert bar_seen.sum() > 300
     seen = simulation.renderer.render(model.camera).depth
     assert within_a_pixel(seen, exact)[bar_seen].all()
     as_cuboid = render(cubes, model.camera)

@@ -131,7 +131,8 @@ def _read_shape(section: Section, name: str, parameters: Sequence[Parameter]) ->
 
 
 def _read_cuboid(section: Section, name: str, parameters: Sequence[Parameter]) -> Body:
-    body = Body(name, *(_linear(section, key, parameters) for key in ("centre", "size")))
+    centre, size = (_linear(section, key, parameters) for key in ("centre", "size"))
+    body = Body(name, centre, size)
     _, smallest, corner = _smallest(body.size, parameters)
     if smallest <= 0.0:
         raise section.error(

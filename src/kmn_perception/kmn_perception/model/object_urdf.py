@@ -55,11 +55,11 @@ def object_urdf(
     solids = [(b.name, b.centre(gamma), b.size(gamma), b.axis) for b in model.bodies]
     if model.stem is not None:
         solids.append((model.stem.body.name, *model.stem.cuboid(gamma), NO_AXIS))
-    for name, centre, size, axis in solids:
+    for name, centre, size, round_axis in solids:
         carrier = name if name in links else WORLD
         place = factors * centre - origins[carrier]
         for kind in ("visual", "collision"):
-            urdf.add_solid(links[carrier], kind, place, np.abs(factors) * size, axis)
+            urdf.add_solid(links[carrier], kind, place, np.abs(factors) * size, round_axis)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 

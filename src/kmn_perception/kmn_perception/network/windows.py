@@ -156,8 +156,9 @@ def morph_of_body(
 
 def _extent(model: KinematicModel, body: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and largest u, v (2,) of a body of the prototype in the canonical image."""
-    cube, axis = (of[body : body + 1] for of in (model.prototype_cubes, model.cylinder_axes))
-    v, u = np.nonzero(~np.isnan(render(cube, model.camera, axis)))
+    alone = slice(body, body + 1)
+    depth = render(model.prototype_cubes[alone], model.camera, model.cylinder_axes[alone])
+    v, u = np.nonzero(~np.isnan(depth))
     if not len(u):
         raise ConfigurationError(
             f"{model.name}: the camera does not see the prototype's {model.bodies[body].name}"

@@ -14,7 +14,7 @@ MIN_DEPTH = 1e-3  # metres in front of the camera; edges are clipped there
 @njit(cache=True, error_model="numpy")
 def line_jacobian(
     result: NDArray[np.float64],
-    line: NDArray[np.float64],
+    line: NDArray[np.floating],
     length: float,
     edge: tuple[NDArray[np.float64], NDArray[np.float64]],
     jacobians: tuple[NDArray[np.float64], NDArray[np.float64]],

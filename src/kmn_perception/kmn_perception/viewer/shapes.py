@@ -33,7 +33,9 @@ def corners(cubes: Cubes) -> NDArray[np.float64]:
 
 def triangles(cubes: Cubes, axes: Axes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return vertices (V, 3) and faces (F, 3) of cuboids (B, 4, 4), or cylinders along axes."""
-    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
+    vertices = [np.empty((0, 3))]
+    faces: list[NDArray[np.int64]] = [np.empty((0, 3), dtype=np.int64)]
+    count = 0
     for cube, axis in zip(cubes, axes.tolist(), strict=True):
         mesh = _mesh(axis)
         vertices.append(mesh.vertices @ cube[:3, :3].T + cube[:3, 3])

@@ -17,8 +17,9 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.parts import FIXED, PRISMATIC, WORLD
 from kmn_perception.model.rendering import render
 from kmn_perception.refinement import RefinementSettings, refine
-from kmn_perception.refinement.geometry import cuboids, shape_of
-from kmn_perception.refinement.solids import raycast_any
+from kmn_perception.refinement.cylinders import SIDE_TERMS, side_point, side_terms
+from kmn_perception.refinement.geometry import Shape, cuboids, shape_of
+from kmn_perception.refinement.solids import PLANES, SIDE, raycast, raycast_any
 from kmn_perception.refinement.view import ModelView, model_view
 from kmn_perception.training.samples import observe
 
@@ -48,9 +49,8 @@ def random_body(
     scaled = {axis for kind, axis in kinds if kind == "scale"}
     possible = [axis for axis in "xyz" if scaled <= {axis}]
     if possible and generator.uniform() < 0.6:
-        radius, length, _ = linear(
-            generator, generator.uniform([0.1, 0.2, 0], [0.3, 0.8, 1]), names
-        )
+        sizes = generator.uniform([0.18, 0.2, 0.0], [0.35, 0.8, 1.0])
+        radius, length, _ = linear(generator, sizes, names)
         axis = str(generator.choice(possible))
         return {"shape": "cylinder", **body, "axis": axis, "radius": radius, "length": length}
     return {**body, "size": linear(generator, generator.uniform(0.2, 0.8, 3), names)}
@@ -115,6 +115,23 @@ def derivative(function: Any, values: Vector, step: float = STEP) -> Vector:
     steps = np.eye(len(values)) * step
     columns = [(function(values + s) - function(values - s)) / (2.0 * step) for s in steps]
     return np.stack(columns, axis=-1)
+
+
+def moving_point(shape: Shape, matrix: Vector, body: int, values: Vector, point: Vector) -> Any:
+    """Return the image (3,) of a point of a body, given in homogeneous pixels, as a function."""
+
+    def cube(at: Vector) -> Vector:
+        moved = matrix[:, :3] @ cuboids(shape, at)[0][body]
+        moved[:, 3] += matrix[:, 3]
+        return moved
+
+    place = np.linalg.solve(cube(values)[:, :3], point - cube(values)[:, 3])
+
+    def image(at: Vector) -> Vector:
+        seen = cube(at) @ [*place, 1.0]
+        return np.asarray(seen / seen[2])
+
+    return image
 
 
 def nearest_hit(model: KinematicModel, cubes: Vector, camera: Camera, u: float, v: float) -> float:
@@ -183,8 +200,40 @@ def test_jacobians_are_finite_differences(folder: Path, seed: int) -> None:
     ends = np.concatenate([ends, np.ones_like(ends[..., :1])], axis=-1)
     shown = (view.faces >= 0) & (np.abs(ends).max(axis=(2, 3)) < 2000.0)
     expected = derivative(lambda at: np.einsum("beki,bei->bek", ends, same(at).lines), values)
+    for body, edge in np.argwhere(shown):
+        if model.bodies[body].is_cylinder:  # a silhouette slides on it, but points of it are fixed
+            for k in range(2):
+                plane = PLANES + 3 * view.faces[body, edge]
+                inverse_depth = ends[body, edge, k] @ view.solids[body, plane : plane + 3]
+                point = ends[body, edge, k] / inverse_depth
+                moves = derivative(moving_point(shape, matrix, body, values, point), values)
+                expected[body, edge, k] = -view.lines[body, edge] @ moves
     analytic = np.einsum("beki,beip->bekp", ends, view.line_jacobians)
     np.testing.assert_allclose(analytic[shown], expected[shown], rtol=1e-3, atol=2e-2)
+
+
+@settings(max_examples=20)
+@given(seeds)
+def test_depths_on_sides_change_as_finite_differences(folder: Path, seed: int) -> None:
+    model, values = random_model(seed, folder)
+    shape, matrix = shape_of(model), model.camera.resized(32, 24).projection
+    view = model_view(shape, values, matrix, CONTACT, RELIEF)
+    terms = np.zeros(SIDE_TERMS)
+
+    def inverse_depth(at: Vector) -> Any:
+        return raycast(model_view(shape, at, matrix, CONTACT, RELIEF).solids, body, u, v)[0]
+
+    for u, v in np.ndindex(32, 24):
+        predicted, body, face = raycast_any(view.solids, float(u), float(v))
+        if face != SIDE:
+            continue
+        point = side_point(view.solids, body, float(u), float(v), predicted)
+        slope = np.hypot(point.by_u, point.by_v) / abs(point.offset)
+        if slope > 0.1:  # a pixel at a limb, that a step moves beyond it
+            continue
+        side_terms(point, predicted, terms)
+        analytic = terms @ view.side_jacobians[body]
+        np.testing.assert_allclose(analytic, derivative(inverse_depth, values), atol=1e-5)
 
 
 @settings(max_examples=60)

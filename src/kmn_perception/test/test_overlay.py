@@ -21,6 +21,7 @@ from kmn_perception.visualization.overlay import (
     OBJECT,
     REFERENCE,
     REFUSED,
+    Bodies,
     Overlay,
     ShownObject,
     save_contact_sheet,
@@ -56,7 +57,7 @@ def _distance(
 
 
 def test_of_a_box_seen_from_a_corner_the_three_edges_at_the_far_corner_are_hidden() -> None:
-    visible, hidden = wireframe(_cuboid((0, 0, 0), 0.4)[None], CAMERA)
+    visible, hidden = wireframe(Bodies.of(_cuboid((0, 0, 0), 0.4)[None]), CAMERA)
     assert len(visible) == pytest.approx(9 * EDGE_PIECES, abs=3)
     assert len(hidden) == pytest.approx(3 * EDGE_PIECES, abs=3)
     far, *ends = _pixels(
@@ -69,16 +70,16 @@ def test_of_a_box_seen_from_a_corner_the_three_edges_at_the_far_corner_are_hidde
 def test_a_body_behind_another_is_hidden() -> None:
     towards_camera = CAMERA.pose[:3, 3] / np.linalg.norm(CAMERA.pose[:3, 3])
     front, rear = _cuboid(tuple(0.5 * towards_camera), 0.4), _cuboid((0, 0, 0), 0.1)
-    alone, _ = wireframe(front[None], CAMERA)
-    visible, hidden = wireframe(np.stack([rear, front]), CAMERA)
+    alone, _ = wireframe(Bodies.of(front[None]), CAMERA)
+    visible, hidden = wireframe(Bodies.of(np.stack([rear, front])), CAMERA)
     assert len(visible) == len(alone)
     assert len(visible) + len(hidden) == 2 * 12 * EDGE_PIECES
 
 
 def test_a_body_in_front_hides_no_more_than_its_outline() -> None:
     beside = [_cuboid((0.0, 0.0, 0.0), 0.2), _cuboid((0.5, -0.4, 0.0), 0.2)]
-    together, _ = wireframe(np.stack(beside), CAMERA)
-    assert len(together) == sum(len(wireframe(cube[None], CAMERA)[0]) for cube in beside)
+    together, _ = wireframe(Bodies.of(np.stack(beside)), CAMERA)
+    assert len(together) == sum(len(wireframe(Bodies.of(cube[None]), CAMERA)[0]) for cube in beside)
 
 
 def _overlay(accepted: bool) -> Overlay:

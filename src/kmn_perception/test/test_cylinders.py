@@ -23,7 +23,7 @@ from kmn_perception.refinement import RefinementSettings, refine
 from kmn_perception.training.samples import observe
 from kmn_perception.visualization.overlay import Bodies, wireframe
 
-BAR = {
+BAR: dict[str, Any] = {
     "shape": "cylinder",
     "centre": [
         -0.075,
@@ -105,8 +105,9 @@ def test_all_consumers_take_the_file_for_the_same_cylinder(tmp_path: Path) -> No
     assert surface_distances(cubes, observation.points, model.cylinder_axes).max() < 1e-5
     assert surface_distances(cubes, observation.points).max() > 1e-3
     x, y, z = BAR["centre"][0], -0.18, 0.95
-    around = np.float32(
-        [[x - 0.011, y, z], [x - 0.02, y, z], [x, y, z + 0.09], [x - 0.008, y - 0.008, z]]
+    around = np.array(
+        [[x - 0.011, y, z], [x - 0.02, y, z], [x, y, z + 0.09], [x - 0.008, y - 0.008, z]],
+        dtype=np.float32,
     )
     bar = slice(2, 3)
     distances = surface_distances(cubes[bar], around, model.cylinder_axes[bar])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.rendering import render
 from kmn_perception.refinement.geometry import cuboids, shape_of
-from kmn_perception.refinement.solids import FACES_CAMERA, PLANES, raycast_any
+from kmn_perception.refinement.solids import PLANES, raycast_any
 from kmn_perception.refinement.view import ModelView, model_view
 
 Vector = NDArray[np.float64]
@@ -73,7 +73,7 @@ def derivative(function: Callable[[Vector], Vector], values: Vector, step: float
 
 def planes(view: ModelView) -> Vector:
     """Return q of the faces (B, 6, 3), see `view`."""
-    return view.solids[:, PLANES:FACES_CAMERA].reshape(-1, 6, 3)
+    return view.solids[:, PLANES : PLANES + 18].reshape(-1, 6, 3)
 
 
 shares = st.lists(st.floats(0.05, 0.95), min_size=7, max_size=7)

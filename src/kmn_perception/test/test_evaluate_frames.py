@@ -69,6 +69,7 @@ def test_it_writes_statistics_and_pictures_with_the_baselines_beside(tmp_path: P
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_frame_without_a_table_in_the_depth_counts_its_objects_as_not_found(
     tmp_path: Path,
 ) -> None:

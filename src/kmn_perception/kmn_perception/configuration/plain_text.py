@@ -13,7 +13,7 @@ MAX_VALUES = 10**6  # a few lines of aliases can stand for billions
 MAX_WHOLE = 2**64  # larger ones are no indices, seeds or sizes, and some no real numbers either
 
 
-def parse_yaml(text: str) -> Any:
+def parse_yaml(text: str | bytes) -> Any:
     """Return what YAML says; it is plain data and executes nothing.
 
     Raises
@@ -22,7 +22,7 @@ def parse_yaml(text: str) -> Any:
         If it is not YAML, nested too deeply, or holds a number that is too large.
     """
     try:
-        tree = yaml.safe_load(text)
+        tree = yaml.safe_load(text if isinstance(text, str) else text.decode())
     except Exception as error:  # PyYAML raises errors of all kinds
         raise ValueError(f"not YAML: {error}") from error
     _check(tree)

@@ -136,10 +136,10 @@ class Section:
         return low, high
 
 
-def _read(path: Path, parse: Callable[[str], Any]) -> Any:
+def _read(path: Path, parse: Callable[[bytes], Any]) -> Any:
     """Return what a file says; raise `ConfigurationError` if it says nothing sensible."""
     try:
-        return parse(path.read_text(encoding="utf-8"))
+        return parse(path.read_bytes())
     except ValueError as error:
         raise ConfigurationError(f"{path.name}: {error}") from error
 

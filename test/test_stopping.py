@@ -99,3 +99,15 @@ def test_a_callback_that_is_at_work_may_communicate_to_its_end(
     finally:
         process.kill()
     assert (process.returncode, "Traceback" in rest) == (0, False), rest
+
+
+def test_a_node_tells_where_its_threads_are_and_goes_on(domain: int) -> None:
+    """A callback that hangs is named."""
+    process = start([sys.executable, "-c", WORKING], domain)
+    try:
+        read_until("at work", process)
+        process.send_signal(signal.SIGUSR1)
+        assert " in work" in read_until(" in run_node", process)
+        read_until("at work", process)
+    finally:
+        process.kill()

@@ -19,6 +19,7 @@ from kmn_perception.ros.parameters import request_to_set
 STOP_TIMEOUT = 10.0  # seconds for a node to end
 LOG_LINES = 5  # of a node's, shown if it ends
 POLL_PERIOD = 0.02  # seconds
+PRINT_TIME = 0.5  # seconds for a program to print where it is
 
 Found = TypeVar("Found")
 
@@ -59,6 +60,13 @@ class NodeProcess:
     def output(self) -> str:
         """Return all that it has printed."""
         return self._log.read_text(errors="replace")
+
+    def where(self) -> str:
+        """Return where each of its threads is, as it prints upon SIGUSR1 (`ros_session`)."""
+        before = len(self.output())
+        self._process.send_signal(signal.SIGUSR1)
+        time.sleep(PRINT_TIME)
+        return self.output()[before:]
 
     def kill(self) -> None:
         """End it without a chance to tidy up, as ``kill -9``."""

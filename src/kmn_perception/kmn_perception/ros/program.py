@@ -5,6 +5,7 @@ The only place that initialises rclpy.
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import signal
 import sys
@@ -53,7 +54,8 @@ def own_arguments() -> list[str]:
 def ros_session(name: str) -> Iterator[None]:
     """Communicate up to the end of a context; an expected error ends the program.
 
-    Being terminated ends the context, too, and with it the nodes that were started in it.
+    Being terminated ends the context, too, and with it the nodes that were started in it. Upon
+    SIGUSR1 the program prints where each of its threads is, and goes on.
 
     Parameters
     ----------
@@ -61,6 +63,7 @@ def ros_session(name: str) -> Iterator[None]:
         Of the program, for the line that says what is wrong.
     """
     signal.signal(signal.SIGTERM, _exit)
+    faulthandler.register(signal.SIGUSR1)
     try:
         initialise(split_arguments(sys.argv[1:])[1])
         yield

@@ -90,6 +90,7 @@ class Soak:
                 end, reason = OPENED if result.success else NOT_OPENED, result.reason
         except NoAnswerError as error:
             reason = str(error)
+            tqdm.write(f"{reason}; the nodes' threads are at:\n{system.where()}")
         except ProcessError as error:  # a node has ended by itself
             reason = str(error)
             self._fallen += [f"{name} during '{trouble}': {reason}" for name in system.revive()]
@@ -103,6 +104,7 @@ class Soak:
         try:
             return system.happen(trouble, self._random)
         except NoAnswerError as error:
+            tqdm.write(f"{error}; the nodes' threads are at:\n{system.where()}")
             self._fallen.append(f"during '{trouble}': {error}")
             return str(error)
 

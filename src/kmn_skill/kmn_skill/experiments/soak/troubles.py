@@ -78,6 +78,11 @@ class TroubledSystem(KilledSystem):
         }
         return act[trouble](random)
 
+    def where(self) -> str:
+        """Return where each thread of the nodes is."""
+        running = {name: one for name, one in self._processes.items() if one.is_running()}
+        return "\n".join(f"{name}:\n{process.where()}" for name, process in running.items())
+
     def revive(self) -> list[str]:
         """Start what has ended by itself, and return it."""
         dead = [name for name, process in self._processes.items() if not process.is_running()]

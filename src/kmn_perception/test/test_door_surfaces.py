@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from kmn_perception.doors.inverse_depth import Blocks
+from kmn_perception.doors.panel_support import support_panel
 from kmn_perception.doors.planes import Plane, find_planes
+from kmn_perception.doors.seen_blocks import FLOOR, OFFSET, PANEL, WALL
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.surfaces import (
-    FLOOR,
-    OFFSET,
-    PANEL,
-    WALL,
-    Surfaces,
-    angle,
-    fit_surfaces,
-)
+from kmn_perception.doors.surfaces import Surfaces, angle, fit_surfaces
 from kmn_perception.doors.upright import HeightSource, SeenHeight, find_camera_height, find_up
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.model.camera import Camera
@@ -72,6 +66,17 @@ def test_a_block_half_of_which_is_unmeasured_or_that_spans_a_step_is_not_valid()
     assert not blocks.valid[0, 0]
     assert not blocks.valid[1, 0]
     assert blocks.valid[2:, 1:].all()
+
+
+def test_blocks_of_a_near_wall_seen_aslant_are_valid_and_those_of_its_edges_are_not() -> None:
+    """Across such a block the inverse depth changes by more than steps that count as edges."""
+    aslant, before = wall(0.8, 0.45), wall(0.8, 0.4)
+    blocks = blocks_of(depth_of([aslant]))
+    assert blocks.valid[1:-1, 1:-1].all()
+    right = np.arange(640)[None] + np.zeros((480, 1)) >= 324  # from the middle of a block on
+    blocks = blocks_of(depth_of([aslant, before], [~right, right]))
+    assert not blocks.valid[:, 40].any()
+    assert blocks.valid[1:-1, 42:-1].all()
 
 
 def test_walls_and_floor_are_found_among_noise() -> None:
@@ -165,18 +170,22 @@ def test_a_wall_that_reaches_the_images_border_is_no_floor() -> None:
     assert camera_height(depth, ~on_wall) is None
 
 
-def recessed(yaw: float, recess: float, turn: float = 0.0) -> np.ndarray:
-    """Return the depth of a wall at 2 m with a panel of 0.9 m behind it, and the floor."""
-    frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
+def recessed(
+    yaw: float, recess: float, turn: float = 0.0, distance: float = 2.0, top: float = 3.0
+) -> np.ndarray:
+    """Return the depth of a wall with a panel behind it, 0.9 m wide in the wall, and the floor."""
+    frame = WallFrame.of(wall(yaw, distance), UP, HEIGHT)
     rays = camera().rays(*np.meshgrid(np.arange(640.0), np.arange(480.0)))
-    side = rays @ frame.right / -(rays @ frame.normal)
-    between = np.abs(side) < 0.45 / 2.0
-    panel = wall(yaw + turn, 2.0 + recess)
+    away = -(rays @ frame.normal)
+    between = np.abs(rays @ frame.right / away) < 0.45 / distance
+    between &= rays @ frame.up / away < (top - HEIGHT) / distance
+    panel = wall(yaw + turn, distance + recess)
     inverse = np.where(between, rays @ panel, rays @ frame.vector)
     return (1.0 / np.maximum(inverse, rays @ floor())).astype(np.float32)
 
 
-EDGES = (-0.45 / 2.0, 0.45 / 2.0)
+def edges_at(distance: float) -> tuple[float, float]:
+    return -0.45 / distance, 0.45 / distance
 
 
 def fit(
@@ -184,11 +193,13 @@ def fit(
     yaw: float,
     offset: float = SETTINGS.calibration.offset,
     source: HeightSource = HeightSource.SEEN,
+    distance: float = 2.0,
 ) -> Surfaces:
-    frame = WallFrame.of(wall(yaw, 2.0), UP, HEIGHT)
+    frame = WallFrame.of(wall(yaw, distance), UP, HEIGHT)
     calibration = SETTINGS.calibration._replace(offset=offset)
+    edges = edges_at(distance)
     surfaces = fit_surfaces(
-        blocks_of(depth), frame, EDGES, EDGES, source, calibration, SETTINGS.fit
+        blocks_of(depth), frame, edges, edges, source, calibration, SETTINGS.fit
     )
     assert surfaces is not None
     return surfaces
@@ -207,7 +218,27 @@ def test_wall_and_panel_are_as_far_as_they_were_built(recess: float) -> None:
     assert far - near == pytest.approx(recess, abs=0.003)
     assert surfaces.opening == 0.0
     assert 1.0 / surfaces.values[FLOOR] == pytest.approx(HEIGHT, abs=0.01)
-    assert surfaces.panel_share > 0.95
+    assert panel_share(recessed(0.2, recess), 0.2, None) > 0.95
+
+
+def panel_share(depth: np.ndarray, yaw: float, top: float | None, distance: float = 2.0) -> float:
+    frame = WallFrame.of(wall(yaw, distance), UP, HEIGHT)
+    surfaces = fit(depth, yaw, distance=distance)
+    edges = edges_at(distance)
+    return support_panel(blocks_of(depth), frame, surfaces, edges, top, SETTINGS.fit).share
+
+
+def test_a_panel_deep_in_its_wall_is_found_from_near() -> None:
+    """At 1 m a recess of 14 cm is 0.12 1/m, at 2 m 0.03."""
+    near, far = distances(fit(recessed(0.1, 0.14, distance=1.0), 0.1, distance=1.0).values)
+    assert far - near == pytest.approx(0.14, abs=0.005)
+    assert panel_share(recessed(0.1, 0.14, distance=1.0), 0.1, None, 1.0) > 0.95
+
+
+def test_the_wall_above_a_low_door_does_not_speak_against_its_panel() -> None:
+    low = recessed(0.0, 0.1, top=1.5)
+    assert panel_share(low, 0.0, None) < 0.8
+    assert panel_share(low, 0.0, 1.5) > 0.95
 
 
 @pytest.mark.parametrize("turn", [-0.15, 0.1])
@@ -232,9 +263,9 @@ def test_what_is_not_measured_has_no_fit() -> None:
     depth = recessed(0.0, 0.05)
     depth[:, 200:440] = 0.0
     frame = WallFrame.of(wall(0.0, 2.0), UP, HEIGHT)
-    settings = replace(SETTINGS.fit)
+    settings, edges = replace(SETTINGS.fit), edges_at(2.0)
     found = fit_surfaces(
-        blocks_of(depth), frame, EDGES, EDGES, HeightSource.SEEN, SETTINGS.calibration, settings
+        blocks_of(depth), frame, edges, edges, HeightSource.SEEN, SETTINGS.calibration, settings
     )
     assert found is None
 

@@ -12,7 +12,7 @@ from kmn_perception.doors.planes import Plane
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.upright import SeenHeight
 
-_ABOVE_DOOR = 0.2  # metres by which a ceiling is above a door's top at least
+_ABOVE_DOOR = 0.2, 2.0  # metres by which a ceiling is above a door's top
 
 
 def find_contradiction(
@@ -78,12 +78,15 @@ def doubt_upright(
     """Return why a camera of which nothing is known may be upside down, or nothing.
 
     A door is much the same when it is turned over, but then a floor meets its top, and a ceiling
-    does not.
+    does not; nor is a camera as far above a floor as it may be below a ceiling.
     """
-    top = float(np.max(found.corners[:2] @ up))
-    height_is_known = bool(_level(planes, up, settings) or found.handle_side)
+    top, (low, high) = float(np.max(found.corners[:2] @ up)), _ABOVE_DOOR
+    by_height = bool(_level(planes, up, settings) or found.handle_side)  # else by its own edge
     for plane in _level(planes, -up, settings):
-        if plane.distance - top < _ABOVE_DOOR or not height_is_known:
+        if plane.distance > settings.floor.heights[1]:
+            continue
+        is_ceiling = low < plane.distance - top < high
+        if not is_ceiling or not (found.top_is_seen or by_height):
             return (
                 f"a level surface is {plane.distance:.2f} m above the camera: it may be the floor, "
                 "and the camera upside down; expected an upright image or the camera's pose"

@@ -39,6 +39,8 @@ class DoorEstimate:
         (4, 4) optical frame in the world, whose origin is on the floor below the camera.
     corners
         (4, 3) of the panel's front: top left, top right, bottom left, bottom right; optical frame.
+    top_is_seen
+        Whether the upper ones are where an edge was found, not where tops usually are.
     handle
         (3,) its middle, optical frame.
     normal
@@ -59,6 +61,7 @@ class DoorEstimate:
     hinge_is_known: bool
     camera_pose: NDArray[np.float64]
     corners: NDArray[np.float64]
+    top_is_seen: bool
     handle: NDArray[np.float64]
     normal: NDArray[np.float64]
     disparity_offset: tuple[float, float]
@@ -79,6 +82,7 @@ class DoorEstimate:
             hinge_is_known=False,
             camera_pose=np.full((4, 4), np.nan),
             corners=np.full((4, 3), np.nan),
+            top_is_seen=False,
             handle=np.full(3, np.nan),
             normal=np.full(3, np.nan),
             disparity_offset=(np.nan, np.nan),

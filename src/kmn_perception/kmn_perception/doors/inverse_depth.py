@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from kmn_perception.doors.search_settings import PlaneSettings
 from kmn_perception.model.camera import Camera
 
+_SPANNED = 0.8  # of a ramp, from the 10th to the 90th percentile
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -26,7 +28,7 @@ class Blocks:
     inverse
         (H, W) inverse depths, 1/m; 0 where nothing is known.
     valid
-        (H, W) blocks that were measured, and show one surface.
+        (H, W) blocks that were measured, and show one surface, also a slanted one.
     size
         Of a block, pixels.
     """
@@ -53,6 +55,7 @@ class Blocks:
         u = np.arange(inverse.shape[1]) * size + (size - 1) / 2.0
         v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
         rays = camera.rays(*np.meshgrid(u, v))
+        spread = spread - _SPANNED * (_ramp(inverse) + _ramp(inverse.T).T)
         return cls(rays, inverse, (inverse > 0.0) & (spread < settings.max_spread * noise), size)
 
     def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -79,3 +82,16 @@ def _medians(
     spread = inverse((9 * count) // 10) - inverse(count // 10)
     enough = count >= least
     return np.where(enough, inverse(count // 2), 0.0), np.where(enough, spread, 0.0)
+
+
+def _ramp(inverse: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return by how much a slanted surface changes over each block (H, W), along its row, 1/m.
+
+    The lesser of the changes from and to its two neighbours if they have one sign, else 0 (minmod):
+    beside a step one of them is the step's, the other is not.
+    """
+    change = np.diff(inverse, axis=1)
+    change[(inverse[:, 1:] == 0.0) | (inverse[:, :-1] == 0.0)] = 0.0
+    before, after = np.pad(change, ((0, 0), (1, 0))), np.pad(change, ((0, 0), (0, 1)))
+    lesser = np.minimum(np.abs(before), np.abs(after))
+    return np.where(before * after > 0.0, lesser, 0.0)

@@ -13,8 +13,9 @@ from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.plan import Plan
 from kmn_perception.doors.proposals import peaks_of
 from kmn_perception.doors.readings import EdgeReading, read_edges
+from kmn_perception.doors.seen_blocks import FLOOR, PANEL, WALL
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces, fit_surfaces
+from kmn_perception.doors.surfaces import Surfaces, fit_surfaces
 from kmn_perception.doors.upright import HeightSource
 
 SIDES = ("left", "right")

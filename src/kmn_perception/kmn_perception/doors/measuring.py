@@ -27,10 +27,12 @@ from kmn_perception.doors.handle import Handle, Hint, find_handle
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.layout import OPPOSITE, SIDES, lay_out, read_at
 from kmn_perception.doors.lintel import Lintel, find_lintel, usual_top
+from kmn_perception.doors.panel_support import PanelSupport, support_panel
 from kmn_perception.doors.proposals import handle_of
 from kmn_perception.doors.readings import EdgeReading
+from kmn_perception.doors.seen_blocks import FLOOR, PANEL, WALL
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.surfaces import FLOOR, PANEL, WALL, Surfaces
+from kmn_perception.doors.surfaces import Surfaces
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 from kmn_perception.doors.walls import Frame
@@ -57,6 +59,7 @@ class Measurement(NamedTuple):
 
     candidate: Candidate
     surfaces: Surfaces
+    support: PanelSupport
     lintel: Lintel
     handle: Handle | None
     latch: str
@@ -77,6 +80,7 @@ def measure(
     if layout is None:
         return None
     surfaces, hinges, edges = layout
+    spans = edges["left"].panel_from("left"), edges["right"].panel_from("right")
     candidate = candidate._replace(left=edges["left"].line, right=edges["right"].line)
     panel = WallFrame.of(_vector(at, surfaces.values[PANEL]), at.up, 1.0 / surfaces.values[FLOOR])
     left, right = (_along(at, panel, surfaces, edges[side].panel) for side in SIDES)
@@ -109,6 +113,7 @@ def measure(
     return Measurement(
         candidate,
         surfaces,
+        support_panel(blocks, at, surfaces, spans, lintel.z, settings.fit),
         lintel,
         handle,
         latch,

@@ -56,6 +56,8 @@ class FitSettings:
         the wall is looked at.
     reach
         Largest offset of wall and panel from the plane that was found, inverse depth, 1/m.
+    behind
+        And how far behind it a panel is looked for at least, metres.
     inlier
         Pixel noises.
     tilt, given_height, seen_height
@@ -85,6 +87,7 @@ class FitSettings:
     frame: Positive
     beside: Positive
     reach: Positive
+    behind: Positive
     inlier: Positive
     tilt: Positive
     given_height: Positive

@@ -17,14 +17,25 @@ from numpy.typing import NDArray
 
 from kmn_perception.doors.inverse_depth import Blocks
 from kmn_perception.doors.normal_equations import add_blocks
+from kmn_perception.doors.seen_blocks import (
+    FLOOR,
+    FLOOR_OFFSET,
+    LOW,
+    PANEL,
+    PANEL_HIGH,
+    SIZE,
+    TILT,
+    WALL,
+    WARP,
+    PartSeen,
+    SeenBlocks,
+)  # fmt: skip
 from kmn_perception.doors.settings import Calibration, FitSettings
 from kmn_perception.doors.upright import HeightSource
 from kmn_perception.doors.wall_view import WallFrame
 
-WALL, PANEL, FLOOR, TILT, OFFSET, WARP = slice(0, 2), slice(2, 4), 4, slice(5, 7), 7, slice(7, 11)
-FLOOR_OFFSET, SIZE = 11, 12
 _TRIALS, _ROUNDS = 150, 5
-_LOW, _HIGH, _PANEL_HIGH = 0.1, 2.4, 1.95  # metres above the floor between which blocks are taken
+_HIGH = 2.4  # metres above the floor up to which the wall is taken
 _MAX_TURN = 0.6  # radians to the plane that was found
 _MIN_AREA = 0.02  # of two rays seen from above; nearer ones tell no line
 _CHECKED = 400  # blocks on which lines are compared, about
@@ -47,10 +58,6 @@ class Surfaces(NamedTuple):
         How many blocks lie on them.
     wall_share
         Share of the unhidden measured blocks beside the edges that lie on the wall.
-    panel_share
-        Share of the unhidden measured blocks between the edges that lie on the panel.
-    panel_visible
-        Share of all blocks between the edges that are measured and unhidden.
     opening
         Angle of the panel to the wall, radians, positive to the right; 0 if it counts as closed.
     """
@@ -60,42 +67,7 @@ class Surfaces(NamedTuple):
     wall_blocks: int
     panel_blocks: int
     wall_share: float
-    panel_share: float
-    panel_visible: float
     opening: float
-
-
-class _Seen(NamedTuple):
-    """Blocks that may lie on a surface.
-
-    Attributes
-    ----------
-    part
-        Of the values: which surface.
-    rays
-        (N, 3) in the wall's axes: to the right, away, up.
-    rows
-        (N, 12) derivatives of the inverse depths, but for those of the tilt.
-    inverse
-        (N,) inverse depths, 1/m.
-    noise
-        Standard deviation that the mean of a block has for its neighbours' errors, 1/m.
-    """
-
-    part: slice | int
-    rays: NDArray[np.float64]
-    rows: NDArray[np.float64]
-    inverse: NDArray[np.float64]
-    noise: float
-
-    def derivatives(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives (N, 12) of the inverse depths at values (12,), until the next."""
-        rows = self.rows  # not copied, since those of the tilt are set anew each time
-        if isinstance(self.part, slice):
-            rows[:, TILT] = -self.rays[:, 2:] * values[self.part]
-        else:
-            rows[:, TILT] = -values[self.part] * self.rays[:, :2]
-        return rows
 
 
 def fit_surfaces(
@@ -119,35 +91,27 @@ def fit_surfaces(
     calibration
         Of the sensor.
     """
-    rays, inverse, valid = blocks.flat()
-    axes = rays @ np.stack([frame.right, -frame.normal, frame.up], axis=-1)
-    ahead = axes[:, 1] > 0.0
-    away = np.where(ahead, axes[:, 1], np.inf)
-    side = axes[:, 0] / away * frame.distance
-    z = axes[:, 2] / away * frame.distance + frame.height
-    left, right, frame_left, frame_right = (edge * frame.distance for edge in (*edges, *outer))
-    level = ahead & (z > _LOW) & (z < _HIGH)
-    beyond = np.maximum(frame_left - side, side - frame_right) - settings.frame
+    seen = SeenBlocks.of(blocks, frame)
+    frame_left, frame_right = (edge * frame.distance for edge in outer)
+    level = (seen.z > LOW) & (seen.z < _HIGH)
+    beyond = np.maximum(frame_left - seen.side, seen.side - frame_right) - settings.frame
     beside = (beyond > 0.0) & (beyond < settings.beside)
-    inside = (side > left + settings.margin) & (side < right - settings.margin)
-    inside &= level & (z < _PANEL_HIGH)
-    offset = inverse - rays @ frame.vector
-    near = valid & (np.abs(offset) < settings.reach)
-
-    def seen(part: slice | int, region: NDArray[np.bool_], noise: float) -> _Seen:
-        noise *= settings.correlation / blocks.size
-        return _Seen(part, axes[region], _rows(part, axes, rays, region), inverse[region], noise)
-
-    wall_seen = seen(WALL, near & level & beside, settings.block_noise)
-    panel_seen = seen(PANEL, near & inside, settings.block_noise)
+    near = seen.valid & (seen.offset < settings.reach)
+    behind = seen.offset_at(settings.behind)
+    noise = settings.block_noise * settings.correlation / blocks.size
+    wall_seen = seen.part(WALL, near & level & beside & (seen.offset > -settings.reach), noise)
+    inside = seen.between(edges, settings.margin, PANEL_HIGH)
+    deepest = np.minimum(-settings.reach, behind)
+    panel_seen = seen.part(PANEL, near & inside & (seen.offset > deepest), noise)
     wall, panel = (_start(surface, settings) for surface in (wall_seen, panel_seen))
     if wall is None or panel is None:
         return None
     surfaces = [wall_seen, panel_seen]
     if height is not HeightSource.USUAL:
-        before = offset > 2.0 * settings.inlier * settings.pixel_noise  # no foot of wall or panel
-        below = valid & (axes[:, 2] < 0.0)
-        surfaces.append(seen(FLOOR, below & before, settings.floor_noise))
+        before = seen.offset > 2.0 * settings.inlier * settings.pixel_noise  # no foot of a wall
+        below = seen.valid & (seen.axes[:, 2] < 0.0)
+        shining = settings.floor_noise * settings.correlation / blocks.size
+        surfaces.append(seen.part(FLOOR, below & before, shining))
     start = np.concatenate((wall, panel, [1.0 / frame.height], np.zeros(SIZE - 5)))
     believed = _believed(start, height, calibration, settings)
     values, covariance, counts = _solve(surfaces, start, believed, None, settings)
@@ -158,20 +122,13 @@ def fit_surfaces(
     opening = turn if abs(turn) > max(least, deviations * deviation) else 0.0
     if abs(turn) < settings.agree * deviation:
         values, covariance, counts = _solve(surfaces, values, believed, settings.closed, settings)
-    around = valid & level & beside & (offset < settings.reach)
-    unhidden = valid & inside & (offset < settings.reach)
-    hidden = valid & inside & (offset >= settings.reach)
-    between = seen(PANEL, unhidden, settings.block_noise)
-    off = np.abs(between.derivatives(values) @ values - between.inverse)
-    on_panel = int((off < settings.inlier * settings.pixel_noise).sum())
+    around = int((near & level & beside).sum())
     return Surfaces(
         values=values,
         covariance=covariance,
         wall_blocks=counts[0],
         panel_blocks=counts[1],
-        wall_share=counts[0] / max(1, int(around.sum())),
-        panel_share=on_panel / max(1, int((inside & ~hidden).sum())),
-        panel_visible=float(unhidden.sum() / max(1, inside.sum())),
+        wall_share=counts[0] / max(1, around),
         opening=opening,
     )
 
@@ -220,7 +177,7 @@ def _turn_row(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return row
 
 
-def _start(seen: _Seen, settings: FitSettings) -> NDArray[np.float64] | None:
+def _start(seen: PartSeen, settings: FitSettings) -> NDArray[np.float64] | None:
     """Return the line (b, c) that most blocks lie on."""
     count = len(seen.inverse)
     if count < settings.min_blocks:
@@ -244,26 +201,8 @@ def _start(seen: _Seen, settings: FitSettings) -> NDArray[np.float64] | None:
     return best
 
 
-def _rows(
-    part: slice | int,
-    axes: NDArray[np.float64],
-    rays: NDArray[np.float64],
-    region: NDArray[np.bool_],
-) -> NDArray[np.float64]:
-    """Return the derivatives (N, 12) of the inverse depths of blocks, but for those of the tilt."""
-    u, v = rays[region, 0], rays[region, 1]
-    rows = np.zeros((len(u), SIZE))
-    rows[:, WARP] = np.stack([np.ones_like(u), u, v, u * u], axis=-1)
-    if isinstance(part, slice):
-        rows[:, part] = axes[region, :2]
-    else:
-        rows[:, part] = -axes[region, 2]
-        rows[:, FLOOR_OFFSET] = 1.0
-    return rows
-
-
 def _solve(
-    surfaces: Sequence[_Seen],
+    surfaces: Sequence[PartSeen],
     start: NDArray[np.float64],
     believed: tuple[NDArray[np.float64], NDArray[np.float64]],
     closed: float | None,

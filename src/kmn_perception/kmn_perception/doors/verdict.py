@@ -9,8 +9,8 @@ from kmn_perception.doors.door_estimate import DoorEstimate, DoorStatus
 from kmn_perception.doors.geometry import WIDTH
 from kmn_perception.doors.measuring import Measurement
 from kmn_perception.doors.proposals import edge_probability
+from kmn_perception.doors.seen_blocks import OFFSET, PANEL
 from kmn_perception.doors.settings import DoorSettings
-from kmn_perception.doors.surfaces import OFFSET, PANEL
 from kmn_perception.doors.wall_view import WallFrame
 
 
@@ -57,6 +57,7 @@ def judge(found: Measurement, settings: DoorSettings) -> DoorEstimate:
         corners=np.array(
             [place(p, z) for z in (float(shape.top), 0.0) for p in (shape.left, shape.right)]
         ),
+        top_is_seen=found.lintel.z is not None,
         handle=place(shape.handle, float(shape.handle_height)),
         normal=-panel[0] * frame.right + panel[1] * frame.normal,
         disparity_offset=(
@@ -113,12 +114,10 @@ def _refusal(found: Measurement, settings: DoorSettings) -> str:
     if surfaces.wall_share < verdict.min_wall:
         share = 100.0 * surfaces.wall_share
         return f"only {share:.0f} % of what is beside the edges lie on a wall"
-    if surfaces.panel_visible < verdict.min_visible:
-        return f"only {100 * surfaces.panel_visible:.0f} % of the panel are seen"
-    if surfaces.panel_share < verdict.min_panel:
-        return (
-            f"only {100 * surfaces.panel_share:.0f} % of what is between the edges lie in a plane"
-        )
+    if found.support.visible < verdict.min_visible:
+        return f"only {100 * found.support.visible:.0f} % of the panel are seen"
+    if found.support.share < verdict.min_panel:
+        return f"only {100 * found.support.share:.0f} % of what is between the edges lie in a plane"
     low, high = verdict.height
     top, slack = found.shape.top, 2.0 * np.sqrt(found.covariance[3, 3])
     if found.lintel.z is not None and not low - slack <= top <= high + slack:

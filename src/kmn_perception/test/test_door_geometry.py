@@ -85,6 +85,18 @@ def test_an_open_door_keeps_the_place_that_it_has_when_it_is_closed(opening: flo
     assert values["handle_y"] == pytest.approx(0.1 - 0.095)
 
 
+@pytest.mark.parametrize("ajar", [False, True])
+def test_a_small_turn_of_the_panel_counts_once(ajar: bool) -> None:
+    """Whether it counts as open or not: as the angle to its wall, not as the wall's own too."""
+    left, opening = np.array([-0.45, 2.0]), 0.028
+    right = left + 0.9 * np.array([np.cos(opening), -np.sin(opening)])
+    wall = line_through(left, left + np.array([0.9, 0.0]))
+    m = measured(left, right, wall, 1.2, np.array([*handle_before(left, right, 0.1), -0.2]))
+    values = dict(zip(DOOR, door_values(m, False, ajar, SQUARE), strict=True))
+    assert values["yaw"] == pytest.approx(0.0, abs=1e-9)
+    assert abs(values["opening"]) == pytest.approx(opening)
+
+
 def test_the_edge_of_a_frame_hides_the_panels_behind_it() -> None:
     """An edge on the wall belongs to the panel straight behind it, not to the one on its ray."""
     wall, recess = np.array([0.0, 1.0 / 2.0]), 0.1

@@ -72,11 +72,11 @@ def test_blocks_of_a_near_wall_seen_aslant_are_valid_and_those_of_its_edges_are_
     """Across such a block the inverse depth changes by more than steps that count as edges."""
     aslant, before = wall(0.8, 0.45), wall(0.8, 0.4)
     blocks = blocks_of(depth_of([aslant]))
-    assert blocks.valid[1:-1, 1:-1].all()
+    assert blocks.valid[3:-3, 3:-3].all()
     right = np.arange(640)[None] + np.zeros((480, 1)) >= 324  # from the middle of a block on
     blocks = blocks_of(depth_of([aslant, before], [~right, right]))
     assert not blocks.valid[:, 40].any()
-    assert blocks.valid[1:-1, 42:-1].all()
+    assert blocks.valid[3:-3, 44:-3].all()
 
 
 def test_walls_and_floor_are_found_among_noise() -> None:

@@ -106,7 +106,7 @@ def door_values(
     latch, hinge = (shape.left, shape.right) if hinge_right else (shape.right, shape.left)
     inset = _dot(shape.handle - latch, along)[..., 0] * (1.0 if hinge_right else -1.0)
     panel = _unit(m[..., 2:4])
-    axis = _unit(m[..., 0:2]) if ajar else panel
+    axis = _unit(m[..., 0:2])  # also of a panel that may be closed: its turn counts once
     across = axis @ np.array([[0.0, -1.0], [1.0, 0.0]])  # along the wall, to the right
     middle = hinge + across * (-0.5 if hinge_right else 0.5) * width
     middle = middle + panel * PANEL_FRONT  # it turns about a point of its middle plane

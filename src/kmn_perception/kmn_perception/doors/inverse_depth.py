@@ -15,6 +15,8 @@ from kmn_perception.doors.search_settings import PlaneSettings
 from kmn_perception.model.camera import Camera
 
 _SPANNED = 0.8  # of a ramp, from the 10th to the 90th percentile
+_SLANTED = 2  # blocks to either side over which a slanted surface goes on
+_STEEP = 0.5  # of the spread that is allowed; what is less steep may be an edge that is smeared
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +57,10 @@ class Blocks:
         u = np.arange(inverse.shape[1]) * size + (size - 1) / 2.0
         v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
         rays = camera.rays(*np.meshgrid(u, v))
-        spread = spread - _SPANNED * (_ramp(inverse) + _ramp(inverse.T).T)
-        return cls(rays, inverse, (inverse > 0.0) & (spread < settings.max_spread * noise), size)
+        allowed = settings.max_spread * noise
+        ramps = _SPANNED * np.stack([_ramp(inverse), _ramp(inverse.T).T])
+        allowed += np.where(ramps > _STEEP * allowed, ramps, 0.0).sum(axis=0)
+        return cls(rays, inverse, (inverse > 0.0) & (spread < allowed), size)
 
     def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Return rays (N, 3), inverse depths and validity (N,), row by row."""
@@ -87,11 +91,12 @@ def _medians(
 def _ramp(inverse: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return by how much a slanted surface changes over each block (H, W), along its row, 1/m.
 
-    The lesser of the changes from and to its two neighbours if they have one sign, else 0 (minmod):
-    beside a step one of them is the step's, the other is not.
+    The least of the changes between the blocks about it if all have one sign, else 0 (minmod): an
+    edge is steep between one or two of them only.
     """
     change = np.diff(inverse, axis=1)
     change[(inverse[:, 1:] == 0.0) | (inverse[:, :-1] == 0.0)] = 0.0
-    before, after = np.pad(change, ((0, 0), (1, 0))), np.pad(change, ((0, 0), (0, 1)))
-    lesser = np.minimum(np.abs(before), np.abs(after))
-    return np.where(before * after > 0.0, lesser, 0.0)
+    change = np.pad(change, ((0, 0), (_SLANTED, _SLANTED)))
+    about = np.lib.stride_tricks.sliding_window_view(change, 2 * _SLANTED, axis=1)
+    least: NDArray[np.float64] = np.maximum(about.min(axis=2), -about.max(axis=2))
+    return np.maximum(least, 0.0)

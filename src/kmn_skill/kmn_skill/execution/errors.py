@@ -46,6 +46,20 @@ class DoorError(SkillError):
     """There is no door to rely on."""
 
 
+class UncertainDoorError(DoorError):
+    """A door is seen, but not known well enough to be grasped.
+
+    Attributes
+    ----------
+    values
+        (n + m,) parameters that it roughly has.
+    """
+
+    def __init__(self, reason: Reason, text: str, values: NDArray[np.float64]) -> None:
+        super().__init__(reason, text)
+        self.values = values
+
+
 class StatesError(SkillError):
     """The states of robot or door cannot be relied upon."""
 

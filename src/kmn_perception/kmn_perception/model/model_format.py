@@ -167,7 +167,7 @@ MODEL: Keys = {
     "input": Key({}, "see below", "none", "Depth image of the paper's network; ours ignores it."),
     "alternatives": Key({"type": "object"}, "by name", "none",
                         "Kinds of handle and fitting of a door in its wall, each of some cuboids; "
-                        "see `room_door.yaml`."),
+                        "see the shipped one that has them."),
     "surroundings": Key({}, "see below", "none", "What stands around a door in its wall."),
     "mechanics": Key({}, "see below", "none",
                      "Masses, frictions and latches; see [simulation](simulation.md)."),

@@ -86,7 +86,7 @@ class RobotFollowing:
         self._followed = None
 
     def reach(self, plan: Plan, check: Callable[[Goal], None]) -> None:
-        """Follow a plan, and check where it led; what slips off there has come there.
+        """Follow a plan, and check where it led; what slips off there and stays has come there.
 
         Parameters
         ----------
@@ -105,6 +105,8 @@ class RobotFollowing:
             if error.reason != "slipped":
                 raise
             self.hold()
+            if self._held.falls_shut(self.hinge):
+                raise ExecutionError("slipped", f"{error}; it falls shut") from error
             slip = error
         try:
             check(Goal(self.handle, self.hinge))

@@ -103,6 +103,9 @@ class DoorOpening:
                     self._looking.again(values)
                     self._memory.forget()
                     values = self._wait_for_door(values)
+                if self._is_there(goal):
+                    self._commands.tell("it is open as far as it is to be opened already")
+                    return
                 self._robot.reach(self._plan(values, goal), check)
                 return
             except ExecutionError as error:
@@ -119,6 +122,12 @@ class DoorOpening:
                 self._commands.tell(f"{error}; {again} again from here")
             except DoorError as error:
                 raise DoorError(error.reason, f"{error}; before, {setback}") from error
+
+    def _is_there(self, goal: Goal) -> bool:
+        """Tell whether what is to be opened is at its target, and does not fall shut."""
+        hinge = self._robot.state().hinge
+        is_near = abs(hinge - goal.target) <= self._settings.door_tolerance
+        return is_near and not self._held.falls_shut(hinge)
 
     def _felt(
         self, values: NDArray[np.float64], offset: NDArray[np.float64]

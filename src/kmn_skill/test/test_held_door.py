@@ -136,6 +136,21 @@ def test_the_handle_of_a_door_moves_on_across_the_line_to_its_hinge(
         assert not scene.held.falls_shut(hinge)
 
 
+@pytest.mark.parametrize("turn", [2.5, 3.0, 3.5])
+def test_a_hand_that_slid_past_the_spindle_tells_no_angle_that_cannot_be(
+    scene: Scene, turn: float
+) -> None:
+    scene.held.see(np.zeros(7), 0.0)
+    place = ACTION.grasp.place(np.zeros(4))
+    pads = np.array([place + [0.0, 0.0, 0.025], place - [0.0, 0.0, 0.025]])
+    scene.fingers.pads = pads
+    scene.held.grasp(ROBOT, CLOSED)
+    scene.fingers.pads = pads + 0.2 * np.array([0.0, np.cos(turn), np.sin(turn)])
+    found = scene.angles()
+    assert -1.2 <= found.handle <= 0.3
+    assert found.hinge == pytest.approx(0.0, abs=0.05)
+
+
 @pytest.mark.parametrize("part", [0.4, 1.6])
 def test_fingers_that_close_or_open_have_lost_the_handle(scene: Scene, part: float) -> None:
     scene.move(0.0, 0.0)

@@ -19,6 +19,7 @@ from kmn_skill.execution.errors import BlockedHandError, ExecutionError
 MISSED_HANDLE: Final = "missed_handle"  # reason of an error
 STEP = 1e-6  # radians, for derivatives
 STARTS = (-1.2, -0.6, 0.0, 0.6, 1.2)  # radians of the hinge, where nothing is known of it
+BEYOND = 0.3  # radians or metres beyond its limits, where no joint is
 LEVEL = 0.1  # metres that a handle rises on a metre of its way, which friction holds
 ITERATIONS = 6  # of Gauss-Newton, from the angles of some hundredths of a second ago
 
@@ -79,6 +80,8 @@ class HeldDoor:
     ) -> None:
         self._model, self._action, self.settings = model, action, settings
         self._pads, self._pad_width = pads, pad_width
+        limits = [joint.limits for joint in action.joints]
+        self._bounds = np.array([*limits, (0.0, 0.0)][:2]).T + [[-BEYOND], [BEYOND]]
         self._values: NDArray[np.float64] = np.zeros(len(model.parameters))
         self._angles = DoorAngles(0.0, 0.0)
         self._grip: Grip | None = None
@@ -223,7 +226,7 @@ class HeldDoor:
             ]
             left = (pads - here).ravel()
             change, *_ = np.linalg.lstsq(np.array(slopes).T, left, rcond=None)
-            angles = angles + change
+            angles = np.clip(angles + change, *self._bounds)
         return DoorAngles(*angles.tolist())
 
     def _moved(

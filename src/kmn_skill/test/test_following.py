@@ -40,8 +40,11 @@ class Followed(RobotFollowing):
         self.holds = True
 
 
-def test_a_hand_that_slips_off_an_open_door_has_opened_it() -> None:
-    robot = Followed(-0.68, -0.88, "slipped")
+@pytest.mark.parametrize("reason", ["slipped", "stuck"])
+def test_where_a_hand_slips_off_an_open_door_or_its_stop_is_it_has_opened_it(
+    reason: Reason,
+) -> None:
+    robot = Followed(-0.68, -0.88, reason)
     robot.reach(None, CHECK)  # type: ignore[arg-type]
     assert robot.holds
 
@@ -64,6 +67,7 @@ def test_a_lid_of_which_the_hand_slips_off_falls_shut() -> None:
         (-0.68, -0.6, "slipped", "the hand is empty"),
         (-0.3, -0.88, "slipped", "the hand is empty"),
         (-0.68, -0.88, "tracking", "the hand is empty"),
+        (-0.68, -0.6, "stuck", "the hand is empty"),
         (-0.68, -0.6, None, "the hinge came to -0.60"),
     ],
 )

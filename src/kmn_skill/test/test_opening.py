@@ -15,6 +15,7 @@ from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.door_observation import DoorObservation, when_closed
 from kmn_skill.execution.goal import SUCCESS, Feedback, Goal, Result
 from kmn_skill.execution.grasp_quantities import hinge_distance, swung
+from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.opening import DoorOpening
@@ -96,7 +97,9 @@ def pursue(
         SETUP.robot.planning.pads.width,
         SETTINGS.grip,
     )
-    knowledge = Knowledge(MODEL, door, memory, watch, held, SETUP.settings.surroundings)
+    knowledge = Knowledge(
+        MODEL, door, memory, watch, held, HandForce(), SETUP.settings.surroundings
+    )
     planner, robot = Planner(), Robot()
     opening: Any = DoorOpening
     result = opening(knowledge, planner, robot, robot, SETTINGS.opening, SETTINGS.execution).run(

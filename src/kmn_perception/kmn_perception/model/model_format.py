@@ -94,6 +94,9 @@ ACTION: Keys = {
     "target": Key(NUMBER, "rad or m", REQUIRED, "To where, unless another position is asked for."),
     "grasp": Key({}, "see below", REQUIRED, "Where a hand takes hold."),
     "unlatch": Key({}, "see below", "nothing", "What is moved first, to let go a latch."),
+    "force_limit": Key({"type": "number", "minimum": 1.0}, "N", "none",
+                       "Largest force with which the hand moves what it holds: what takes more is "
+                       "stuck. Where `handle_force` tells it, see [the skill](skill.md)."),
     "motions": Key(TEXT, "text", "the model's name",
                    "That are transferred: a name of `config/skill/prototypes/ROBOT`, or a file "
                    "beside this one."),

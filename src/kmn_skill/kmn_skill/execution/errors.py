@@ -18,7 +18,7 @@ Reason = Literal[
     # states of robot and door, controllers
     "no_states", "states_stopped", "stale_states", "another_world", "controller",
     # the motion
-    "tracking", "slipped", "missed_handle", "missed",
+    "tracking", "slipped", "missed_handle", "missed", "stuck",
     # a fault of the program
     "internal_error",
 ]  # fmt: skip

@@ -17,7 +17,7 @@ from kmn_skill.execution.errors import (
     SkillError,
     StatesError,
 )
-from kmn_skill.execution.following import RobotFollowing
+from kmn_skill.execution.following import STUCK, RobotFollowing
 from kmn_skill.execution.goal import SUCCESS, Client, Commands, Goal, Outcome, Result
 from kmn_skill.execution.goal_check import check_goal, check_reached
 from kmn_skill.execution.grasp_quantities import hinge_distance, swung, with_handle_moved
@@ -62,7 +62,8 @@ class DoorOpening:
         settings: OpeningSettings,
         execution: ExecutionSettings,
     ) -> None:
-        self._model, self._door, self._memory, self._watch, self._held, self._wall = knowledge
+        self._model, self._door, self._memory = knowledge.model, knowledge.door, knowledge.memory
+        self._watch, self._held, self._wall = knowledge.watch, knowledge.held, knowledge.wall
         self._action = self._model.actions[0]
         self._planner, self._commands, self._client = planner, commands, client
         self._settings = settings
@@ -110,7 +111,7 @@ class DoorOpening:
                 return
             except ExecutionError as error:
                 self._robot.hold()
-                if not retries_left:
+                if not retries_left or error.reason == STUCK:
                     raise
                 if isinstance(error, BlockedHandError):
                     values, is_elsewhere = self._felt(values, error.offset(blocked)), False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
@@ -32,6 +34,7 @@ from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.goal import Goal, Result
+from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.opening import DoorOpening
@@ -96,6 +99,7 @@ class SkillNode(OverridableNode):
                 setup.robot.planning.pads.width,
                 settings.grip,
             ),
+            HandForce(),
             setup.settings.surroundings,
         )
         self._statistics = SkillStatistics()
@@ -174,6 +178,8 @@ class SkillNode(OverridableNode):
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self._on_parameters_of_door, QUEUE_DEPTH
         )
+        if math.isfinite(self._action.force_limit):
+            self.create_subscription(WrenchStamped, "handle_force", self._on_force, QUEUE_DEPTH)
         report_periodically(self, self._report)
         self._server = GoalServer(
             self,
@@ -202,6 +208,16 @@ class SkillNode(OverridableNode):
             knowledge.held.let_go()
             knowledge.memory.forget()
             self._warnings.warn("break", f"another world: {watch.last_break}")
+
+    def _on_force(self, message: WrenchStamped) -> None:
+        try:
+            force = messages.force_from_wrench(message)
+            force = self._frames.turned(force, message.header.frame_id)
+        except MessageError as error:
+            self._refuse("handle_force", error.reason, error)
+        else:
+            self._refusals.clear("handle_force")
+            self._knowledge.force.put(seconds(message.header.stamp), force)
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
         observation = messages.observation_from_message(message, self._action.joint.name)

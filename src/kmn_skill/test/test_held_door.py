@@ -31,7 +31,7 @@ class Fingers:
     """A hand of which the test says where its fingers are."""
 
     def __init__(self) -> None:
-        self.pads = np.zeros((2, 3))
+        self.pads: NDArray[np.float64] = np.zeros((2, 3))
 
     def __call__(self, robot: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.pads
@@ -142,7 +142,7 @@ def test_a_hand_that_slid_past_the_spindle_tells_no_angle_that_cannot_be(
 ) -> None:
     scene.held.see(np.zeros(7), 0.0)
     place = ACTION.grasp.place(np.zeros(4))
-    pads = np.array([place + [0.0, 0.0, 0.025], place - [0.0, 0.0, 0.025]])
+    pads = np.array([[*place], [*place]]) + [[0.0, 0.0, 0.025], [0.0, 0.0, -0.025]]
     scene.fingers.pads = pads
     scene.held.grasp(ROBOT, CLOSED)
     scene.fingers.pads = pads + 0.2 * np.array([0.0, np.cos(turn), np.sin(turn)])

@@ -15,12 +15,14 @@ from rclpy.parameter import Parameter
 
 from kmn_msgs.action import OperateJoint
 from kmn_perception.configuration import resources
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
 from door_client import PATIENT, TrueDoorClient  # noqa: E402
 from kmn_skill.execution.errors import GoalError  # noqa: E402
+from kmn_skill.experiments.action_option import chosen_action  # noqa: E402
 from kmn_skill.ros.goal_interfaces import OperateJointInterface  # noqa: E402
 from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
 from kmn_skill.ros.skill_node import SkillNode  # noqa: E402
@@ -81,6 +83,14 @@ def test_the_joint_and_the_side_choose_the_action(tmp_path: Path) -> None:
     assert chosen("other_slide", 0.15) == (2, 0.15)
     with pytest.raises(GoalError, match="'hinge' is asked for, expected 'slide' or 'other_slide'"):
         chosen("hinge", math.nan)
+
+
+def test_a_program_is_for_the_action_that_is_named(tmp_path: Path) -> None:
+    model = KinematicModel.load(two_drawers(tmp_path))
+    assert chosen_action(model, "").actions == model.actions
+    assert chosen_action(model, "open_other").actions == model.actions[1:]
+    with pytest.raises(ConfigurationError, match="no action 'lift', expected open or open_other"):
+        chosen_action(model, "lift")
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import WrenchStamped
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
@@ -113,14 +115,40 @@ def test_the_same_by_the_door_s_action(system: DrawerClient) -> None:
     assert answer.result.door_angle == pytest.approx(-0.2, abs=0.02)
 
 
-def test_of_a_drawer_that_is_stuck_the_hand_slips(system: DrawerClient, tmp_path: Path) -> None:
-    """No sensor tells a force; the skill tells what it sees: that the drawer did not follow."""
+@pytest.mark.parametrize(
+    ("frame", "newtons", "reason"),
+    [("world", math.nan, "the force is not finite"), ("nowhere", 1.0, "'nowhere'")],
+)
+def test_a_force_that_is_none_is_refused_with_the_reason(
+    system: DrawerClient, frame: str, newtons: float, reason: str
+) -> None:
+    publisher = system.create_publisher(WrenchStamped, "handle_force", 1)
+    message = WrenchStamped()
+    message.header.frame_id, message.wrench.force.x = frame, newtons
+    system.graph.wait_for(lambda: publisher.get_subscription_count() > 0)
+    publisher.publish(message)
+    system.graph.wait_for(
+        lambda: any("handle_force refused" in text and reason in text for text in system.log)
+    )
+    system.destroy_publisher(publisher)
+
+
+def test_a_drawer_that_is_stuck_is_told_by_the_force_that_it_takes(
+    system: DrawerClient, tmp_path: Path
+) -> None:
+    """Before the hand slips off; it is not tried again, though it might be."""
     content = yaml.safe_load(resources.find("config/models", "drawer").read_text())
     content["mechanics"]["joints"]["slide"]["friction"] = 1000.0
     stuck = tmp_path / "drawer.yaml"
     stuck.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     assert system.set_simulator(model=str(stuck)).successful
+    assert system.set(retries=2).successful
     status, result = system.move()
-    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, result.SLIPPED)
+    assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, result.STUCK)
+    assert re.search(
+        r"slide is stuck at .* takes \d+ N to move on, expected at most 60 N", result.reason
+    )
+    assert result.attempts == 1
     assert abs(system.doors[-1].position[0]) < 0.01
-    assert abs(result.position) < 0.1
+    assert abs(result.position) < 0.02
+    system.assert_it_holds()

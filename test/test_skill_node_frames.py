@@ -74,7 +74,7 @@ def test_a_door_without_a_transform_is_refused_and_one_with_it_is_taken(
     there = pose_2d(0.2, 0.1, -0.3)
     broadcaster.move(*(told("odom", "support_plane", stamp, there) for stamp in stamps))
     client.graph.wait_for(lambda: used(client) == 3)
-    values = node._knowledge.door.values(node.now())
+    values = node._skill.knowledge.door.values(node.now())
     expected = there @ MODEL.transformation.matrix(VALUES[:3])
     np.testing.assert_allclose(MODEL.transformation.matrix(values[:3]), expected, atol=1e-6)
 
@@ -92,4 +92,4 @@ def test_a_door_on_another_ground_is_refused(client: Any, node: SkillNode) -> No
     with pytest.raises(
         DoorError, match="the ground of 'table' is tilted by 0.0 deg and \\+0.300 m"
     ):
-        node._knowledge.door.values(node.now())
+        node._skill.knowledge.door.values(node.now())

@@ -34,14 +34,14 @@ PARAMETERS = {
 
 
 class Perception:
-    """Tells the true door, and its handle only to a robot that stands near enough."""
+    """Tells the true door, and its handle, and that surely, only to one who stands near enough."""
 
     def __init__(self, client: DoorClient) -> None:
         self._client, self._over = client, threading.Event()
         self._truth: list[MorphingParameters] = []
         client.create_subscription(MorphingParameters, "ground_truth", self._truth.append, 1)
         client.graph.wait_for(lambda: self._truth)
-        self.sees_handle_within = DISTANCE + 0.1
+        self.sees_handle_within, self.is_sure_within = DISTANCE + 0.1, 9.0
         self._thread = threading.Thread(target=self._publish)
         self._thread.start()
 
@@ -62,6 +62,9 @@ class Perception:
             if distance > self.sees_handle_within:
                 message.status = MorphingParameters.HANDLE_NOT_SEEN
                 message.reason = "no handle is seen"
+            elif distance > self.is_sure_within:
+                count = len(message.theta) + len(message.gamma)
+                message.covariance = (0.033**2 * np.eye(count)).ravel().tolist()
             self._client.parameters.publish(message)
 
 
@@ -112,6 +115,36 @@ def test_a_handle_that_is_not_seen_from_near_either_is_not_grasped(
     phases = list(dict.fromkeys(feedback.phase for feedback in system.feedback))
     assert phases == ["wait", "look"]
     system.assert_it_holds()
+
+
+def test_a_handle_that_is_not_known_well_enough_is_looked_at_from_nearer(
+    system: DoorClient, perception: Perception
+) -> None:
+    perception.sees_handle_within, perception.is_sure_within = 9.0, DISTANCE - 0.1
+    system.start_anew()
+    assert system.set(look_nearer=0.85, door_timeout=20.0).successful
+    handle = system.send()
+    system.wait_for_phase("plan")
+    x, y, _ = perception.door()
+    base = np.hypot(*(system.state()[1][:2] - [x, y]))
+    assert base == pytest.approx(0.85 * DISTANCE, abs=0.02)
+    system.wait(handle.cancel_goal_async())
+    assert system.result(handle)[0] == GoalStatus.STATUS_CANCELED
+
+
+def test_a_handle_that_is_known_well_enough_from_nowhere_is_not_grasped(
+    system: DoorClient, perception: Perception
+) -> None:
+    perception.is_sure_within = 0.0
+    system.start_anew()
+    assert system.set(looks=2, door_timeout=1.0).successful
+    reason = system.fail()
+    assert "the standard deviation of the handle is 0.0" in reason
+    assert "looked from 1.10, 0.94 m before it" in reason
+    phases = list(dict.fromkeys(feedback.phase for feedback in system.feedback))
+    assert phases == ["wait", "look"]
+    system.assert_it_holds()
+    perception.is_sure_within = 9.0
 
 
 def test_a_robot_that_looks_first_does_so_though_it_sees_the_handle_from_afar(

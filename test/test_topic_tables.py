@@ -31,7 +31,7 @@ OF_ALL_NODES = re.compile(
 NODES: dict[str, tuple[type[Node], str, dict[str, Any]]] = {  # with all that they may have
     "docs/morph_node.md": (MorphNode, "morph_node", {"model": "room_door"}),
     "docs/simulation.md": (SimNode, "sim_node", {"publish_clock": True, "image": True}),
-    "docs/skill.md": (SkillNode, "skill_node", {"door_angles": "door_state"}),
+    "docs/skill.md": (SkillNode, "skill_node", {"door_angles": "door_state", "model": "drawer"}),
     "docs/viewer.md": (Viewer, "viewer", {"port": 0}),
 }
 NOT_AT_ONCE = {  # subscribed when they are needed, or served by another node

@@ -83,10 +83,11 @@ class Kind(NamedTuple):
 def kinds(folder: Path) -> Iterator[Kind]:
     """Yield all kinds; valid files that are not shipped are made in a folder."""
     config, share = share_directory() / "config", share_directory()
-    models = [file for file in _files(config, "models/*.yaml") if file.stem != "room_door"]
+    in_walls = config / f"models/{DoorSettings.load().model}.yaml"
+    models = [file for file in _files(config, "models/*.yaml") if file != in_walls]
     yaml, json, picture = mutations.change_yaml, mutations.change_json, change_picture
     yield Kind("model", models, yaml, read_model)
-    yield Kind("model of a room", [config / "models/room_door.yaml"], yaml, RoomModel.load)
+    yield Kind("model of a room", [in_walls], yaml, RoomModel.load)
     yield Kind("camera", _files(config, "cameras/*.yaml"), yaml, read_camera)
     sensors = _files(config, "sensors/*.yaml")
     yield Kind("sensor", sensors, yaml, lambda file: load_settings(DepthSensor, file))
@@ -179,7 +180,7 @@ def _weights(share: Path) -> Iterator[Kind]:
     change = mutations.change_safetensors
     ours = [share / f"weights/{WEIGHTS_OF}.safetensors"]
     yield Kind("weights", ours, change, lambda file: weights.load(file, model))
-    wall = [share / "weights/room_door.safetensors"]
+    wall = [share / f"weights/{DoorSettings.load().model}.safetensors"]
     yield Kind("weights for walls", wall, change, lambda file: wall_weights.load(file, cells))
 
 
@@ -266,11 +267,8 @@ def _training_runs(folder: Path) -> Iterator[Kind]:
 
     change = mutations.change_bytes
     yield Kind("checkpoint", [checkpoint], change, resume, ("checkpoint.pt",))
-    shard, rooms, doors = (
-        folder / "shard.npz",
-        WallTrainingSettings.load("room_door"),
-        DoorSettings.load(),
-    )
+    shard, doors = folder / "shard.npz", DoorSettings.load()
+    rooms = WallTrainingSettings.load(doors.model)
     np.savez_compressed(
         shard,
         cells=np.zeros((3, 8, 20), np.int8),

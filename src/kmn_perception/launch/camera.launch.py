@@ -2,7 +2,7 @@
 
 For a full ROS 2 Jazzy:
 
-    ros2 launch kmn_perception camera.launch.py model:=room_door \
+    ros2 launch kmn_perception camera.launch.py model:=NAME \
         depth_image:=/camera/depth/image_rect_raw camera_info:=/camera/depth/camera_info
 """
 

@@ -215,6 +215,10 @@ OPEN = {"joint": "slide", "target": -0.3, "grasp": {"body": "bar", "axis": "z"}}
         ({"actions": {"open": {**OPEN, "joint": "mount"}}}, "'joint' must be one of slide"),
         ({"actions": {"open": {**OPEN, "target": -0.6}}}, "'target' must be a number in"),
         (
+            {"actions": {"open": {"joint": "slide", "target": -0.3}}},
+            "actions: open: key 'grasp' is missing",
+        ),
+        (
             {"actions": {"open": {**OPEN, "grasp": {"body": "cabinet", "axis": "z"}}}},
             "is not moved by the joint 'slide'",
         ),

@@ -160,6 +160,7 @@ def test_the_tool_goes_on_from_its_rooms_and_documents_what_it_made(
     train(arguments(options))
     weights = wall_weights.load(out, describe_cells(DOORS))
     assert weights.network.width == 16
+    assert weights.metadata["model"] == DOORS.model
     assert weights.metadata["training"]["fit"]["epochs"] == 1
     assert weights.metadata["errors"]["of"]["edges"] > 0
     assert list((run / "curves").iterdir())

@@ -58,7 +58,7 @@ def test_codes_have_their_names() -> None:
 def test_a_result_is_a_success_exactly_if_its_code_is(outcome: str) -> None:
     result = Result(outcome, "because")  # type: ignore[arg-type]
     drawer = KinematicModel.load("drawer")
-    operate = OperateJointInterface(drawer, drawer.actions[0])
+    operate = OperateJointInterface(drawer)
     for message in (OpenDoorInterface().result(result), operate.result(result)):
         assert message.success == (message.error_code == OpenDoor.Result.SUCCESS)
 

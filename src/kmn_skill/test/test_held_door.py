@@ -31,7 +31,7 @@ class Fingers:
     """A hand of which the test says where its fingers are."""
 
     def __init__(self) -> None:
-        self.pads = np.zeros((2, 3))
+        self.pads: NDArray[np.float64] = np.zeros((2, 3))
 
     def __call__(self, robot: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.pads
@@ -120,6 +120,35 @@ def test_a_door_that_was_let_go_stays_and_its_handle_springs_back(scene: Scene) 
     scene.held.grasp(ROBOT, np.array([-0.4, 0.0]))
     scene.move(-0.8, -0.3)
     assert scene.angles() == pytest.approx((-0.8, -0.3), abs=1e-6)
+
+
+def test_the_handle_of_a_door_moves_on_across_the_line_to_its_hinge(
+    scene: Scene, model: KinematicModel
+) -> None:
+    """As the planner's world has it, and level: no door about a vertical axis falls shut."""
+    scene.held.see(VALUES, 0.0)
+    for hinge, further in ((-0.5, -0.501), (0.5, 0.501)):
+        scene.move(hinge, 0.0)
+        here = scene.fingers.pads.mean(axis=0)
+        scene.move(further, 0.0)
+        way = scene.fingers.pads.mean(axis=0) - here
+        assert scene.held.way(hinge) == pytest.approx(way / np.linalg.norm(way), abs=1e-3)
+        assert not scene.held.falls_shut(hinge)
+
+
+@pytest.mark.parametrize("turn", [2.5, 3.0, 3.5])
+def test_a_hand_that_slid_past_the_spindle_tells_no_angle_that_cannot_be(
+    scene: Scene, turn: float
+) -> None:
+    scene.held.see(np.zeros(7), 0.0)
+    place = ACTION.grasp.place(np.zeros(4))
+    pads = np.array([[*place], [*place]]) + [[0.0, 0.0, 0.025], [0.0, 0.0, -0.025]]
+    scene.fingers.pads = pads
+    scene.held.grasp(ROBOT, CLOSED)
+    scene.fingers.pads = pads + 0.2 * np.array([0.0, np.cos(turn), np.sin(turn)])
+    found = scene.angles()
+    assert -1.2 <= found.handle <= 0.3
+    assert found.hinge == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.parametrize("part", [0.4, 1.6])

@@ -13,8 +13,9 @@ from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.door_observation import DoorObservation, when_closed
-from kmn_skill.execution.goal import Feedback, Goal
+from kmn_skill.execution.goal import SUCCESS, Feedback, Goal, Result
 from kmn_skill.execution.grasp_quantities import hinge_distance, swung
+from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.opening import DoorOpening
@@ -68,8 +69,13 @@ class Robot:
         pass
 
 
-def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float64]:
-    """Return the door that is planned for, when one is seen after the robot has driven a metre."""
+def pursue(
+    seen: NDArray[np.float64], remembered: bool = False, hinge: float = np.nan
+) -> tuple[Result, PlanRequest | None]:
+    """Return what becomes of a goal, and what is planned for it.
+
+    A door is seen, open by an angle, after the robot has driven a metre.
+    """
     home = SETUP.robot.home
     memory = DoorMemory()
     if remembered:
@@ -82,7 +88,8 @@ def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float
     names = tuple(parameter.name for parameter in MODEL.parameters)
     for age in (0.2, 0.1, 0.0):
         covariance = 1e-8 * np.eye(len(seen))
-        door.add(DoorObservation(NOW - age, "door", "world", names, seen, covariance, ""))
+        told = DoorObservation(NOW - age, "door", "world", names, seen, covariance, "", hinge=hinge)
+        door.add(told)
     held = HeldDoor(
         MODEL,
         SETUP.action,
@@ -90,15 +97,30 @@ def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float
         SETUP.robot.planning.pads.width,
         SETTINGS.grip,
     )
-    knowledge = Knowledge(MODEL, door, memory, watch, held, SETUP.settings.surroundings)
+    knowledge = Knowledge(
+        MODEL, door, memory, watch, held, HandForce(), SETUP.settings.surroundings
+    )
     planner, robot = Planner(), Robot()
     opening: Any = DoorOpening
     result = opening(knowledge, planner, robot, robot, SETTINGS.opening, SETTINGS.execution).run(
         Goal(-0.7, -0.9)
     )
+    return result, planner.request
+
+
+def planned_for(seen: NDArray[np.float64], remembered: bool) -> NDArray[np.float64]:
+    """Return the door that is planned for."""
+    result, request = pursue(seen, remembered)
     assert result.outcome == "no_plan"
-    assert planner.request is not None
-    return np.concatenate([planner.request.theta, planner.request.gamma])
+    assert request is not None
+    return np.concatenate([request.theta, request.gamma])
+
+
+@pytest.mark.parametrize(("hinge", "is_there"), [(-0.84, True), (-0.78, False), (0.9, False)])
+def test_a_door_that_is_open_so_far_already_is_left_alone(hinge: float, is_there: bool) -> None:
+    result, request = pursue(DOOR, hinge=hinge)
+    assert (result.outcome == SUCCESS, request is None) == (is_there, is_there)
+    assert result.opened == pytest.approx(hinge)
 
 
 def test_a_door_that_the_robot_may_hide_is_where_it_was_before() -> None:

@@ -20,6 +20,7 @@ from tqdm import tqdm
 from kmn_perception.benchmark.scene import boxes_on_a_table
 from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.doors.door_tracker import DoorTracker
+from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.model.camera import Camera
 from kmn_perception.pipeline_interface import Pipeline
 from kmn_perception.rooms.sequence import make_sequence
@@ -43,7 +44,7 @@ ROOM = 6100  # seed of a room whose door is in view
 RATE = 30.0  # Hz
 DISTINCT = 4  # frames whose noise differs; they come again and again
 LARGE = 1280, 720
-DOOR = {"model": "room_door", "camera_pose": "support_plane", "calibration": "calibrated"}
+DOOR = {"camera_pose": "support_plane", "calibration": "calibrated"}
 TABLETOP = "morph_node_tabletop"  # file of parameters
 
 
@@ -79,7 +80,8 @@ def profile(name: str, repetitions: int) -> str:
 
 
 def _cases(repetitions: int) -> dict[str, Callable[[], list[float]]]:
-    doors = load_pipeline(MorphNodeSettings.check({**parameter_values("morph_node"), **DOOR}))
+    in_walls = {**parameter_values("morph_node"), **DOOR, "model": DoorSettings.load().model}
+    doors = load_pipeline(MorphNodeSettings.check(in_walls))
     boxes = load_pipeline(MorphNodeSettings.check(parameter_values("morph_node", TABLETOP)))
     small, large = (list(_door_frames(size)) for size in (None, LARGE))
     on_table = [Seen(boxes_on_a_table(boxes.model), None, boxes.model.camera)]

@@ -68,7 +68,7 @@ class DoorFinder:
             If the weights are missing, corrupt, or of another network.
         """
         settings = DoorSettings.load()
-        weights = wall_weights.load(weights_file or wall_weights.MODEL, describe_cells(settings))
+        weights = wall_weights.load(weights_file or settings.model, describe_cells(settings))
         return cls(settings, weights.network)
 
     def with_calibration(self, calibration: Calibration) -> DoorFinder:

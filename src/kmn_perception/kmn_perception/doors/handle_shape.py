@@ -18,9 +18,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from kmn_perception.doors.part_settings import ShapeSettings
+from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.doors.wall_view import WallFrame, WallView
 from kmn_perception.model.room_model import RoomModel
-from kmn_perception.network import wall_weights
 
 KINDS = ("lever", "knob")
 _SIDE, _LEVEL, _FRONT, _FITTING = range(1, 5)  # faces by where they look, and what is behind
@@ -240,7 +240,7 @@ def _labels(
 @cache
 def _shapes(kind: str, lengths: int) -> _Shapes:
     """Return a kind of handle in some lengths within the model's limits, with all fittings."""
-    model = RoomModel.load(wall_weights.MODEL)
+    model = RoomModel.load(DoorSettings.load().model)
     door, names = model.model, [parameter.name for parameter in model.nuisance]
     usual = np.zeros(len(door.gamma))
     panel, grip = door.body("panel"), door.body("handle").centre(usual)

@@ -184,8 +184,12 @@ class PriorSettings(NamedTuple):
 
 @dataclass(frozen=True)
 class DoorSettings:
-    """All of the above, and the sensor's calibration: the user's, and as it is ``delivered``."""
+    """All of the above, and the sensor's calibration: the user's, and as it is ``delivered``.
 
+    ``model`` is the name of the doors' kinematic model, and of the shipped weights that propose it.
+    """
+
+    model: str
     planes: PlaneSettings
     vertical: VerticalSettings
     floor: FloorSettings

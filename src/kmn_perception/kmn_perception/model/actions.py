@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +56,8 @@ class Action:
         Position of that joint at which it is let go, m or rad.
     motions
         Name of the motions that are transferred to this object, or the path of their file.
+    force_limit
+        Largest force with which what is grasped is moved on, newtons; infinite if not told.
     """
 
     name: str
@@ -64,6 +67,7 @@ class Action:
     unlatched: float
     grasp: Grasp
     motions: str
+    force_limit: float = math.inf
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -93,7 +97,7 @@ def read_actions(
     found = []
     for name in actions.values:
         action = actions.section(name)
-        action.allow(("joint", "target", "grasp"), ("unlatch", "motions"))
+        action.allow(("joint", "target", "grasp"), ("unlatch", "motions", "force_limit"))
         joint = by_name[action.text("joint", by_name)]
         unlatch, unlatched = None, 0.0
         if "unlatch" in action:
@@ -110,6 +114,7 @@ def read_actions(
             unlatched,
             grasp,
             _motions(action.text("motions", default=section.text("name")), folder),
+            action.number("force_limit", 1.0) if "force_limit" in action else math.inf,
         )
         moved = movers(grasp.body.name, joints)
         if missing := [each.name for each in read.joints if each.name not in moved]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -201,6 +201,10 @@ class KinematicModel:
     def joint(self, name: str) -> Joint:
         """Return the joint of a name."""
         return next(joint for joint in self.joints if joint.name == name)
+
+    def doing(self, number: int) -> KinematicModel:
+        """Return the same object with one of its actions alone, counted from 0."""
+        return replace(self, actions=(self.actions[number],))
 
     def motions(
         self, gamma: ArrayLike, positions: Mapping[str, float]

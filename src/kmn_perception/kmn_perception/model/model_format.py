@@ -94,6 +94,9 @@ ACTION: Keys = {
     "target": Key(NUMBER, "rad or m", REQUIRED, "To where, unless another position is asked for."),
     "grasp": Key({}, "see below", REQUIRED, "Where a hand takes hold."),
     "unlatch": Key({}, "see below", "nothing", "What is moved first, to let go a latch."),
+    "force_limit": Key({"type": "number", "minimum": 1.0}, "N", "none",
+                       "Largest force with which the hand moves what it holds: what takes more is "
+                       "stuck. Where `handle_force` tells it, see [the skill](skill.md)."),
     "motions": Key(TEXT, "text", "the model's name",
                    "That are transferred: a name of `config/skill/prototypes/ROBOT`, or a file "
                    "beside this one."),
@@ -167,7 +170,7 @@ MODEL: Keys = {
     "input": Key({}, "see below", "none", "Depth image of the paper's network; ours ignores it."),
     "alternatives": Key({"type": "object"}, "by name", "none",
                         "Kinds of handle and fitting of a door in its wall, each of some cuboids; "
-                        "see `room_door.yaml`."),
+                        "see the shipped one that has them."),
     "surroundings": Key({}, "see below", "none", "What stands around a door in its wall."),
     "mechanics": Key({}, "see below", "none",
                      "Masses, frictions and latches; see [simulation](simulation.md)."),

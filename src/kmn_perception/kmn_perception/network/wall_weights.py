@@ -11,7 +11,6 @@ from kmn_perception.network.wall_network import KINDS, WallNetwork
 from kmn_perception.network.weight_file import WeightsError
 
 NETWORK = "wall"  # the design's name in weight files
-MODEL = "room_door"
 
 
 class WallWeights(NamedTuple):
@@ -22,8 +21,8 @@ class WallWeights(NamedTuple):
     cells
         How the cells that it reads are made of a view, by name.
     metadata
-        ``training`` (settings, seed), ``errors`` (measured after training), and what `save` adds:
-        ``model``, ``network``, ``design`` (width, kinds of handles, cells) and ``format``.
+        ``model``, ``training`` (settings, seed), ``errors`` (measured after training), and what
+        `save` adds: ``network``, ``design`` (width, kinds of handles, cells) and ``format``.
     """
 
     network: WallNetwork
@@ -33,7 +32,7 @@ class WallWeights(NamedTuple):
 
 def save(path: Path, weights: WallWeights) -> None:
     """Write a weight file; raise ``OSError`` where that fails, with no part of it left."""
-    known = {"model": MODEL, "network": NETWORK, "design": _design(weights)}
+    known = {"network": NETWORK, "design": _design(weights)}
     weight_file.write(path, weights.network.state_dict(), {**weights.metadata, **known})
 
 

@@ -84,7 +84,7 @@ class Door:
     Attributes
     ----------
     values
-        (7,) theta and gamma of the model ``room_door``; theta is the closed panel's.
+        (7,) theta and gamma of the model of the rooms; theta is the closed panel's.
     nuisance
         By name, the nuisances of the model: recess, frame, opening.
     handle, side, fitting

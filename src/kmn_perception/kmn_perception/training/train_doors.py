@@ -32,7 +32,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--out", required=True, type=output_file, help="weight file to write")
     parser.add_argument(
         "--config",
-        default=wall_weights.MODEL,
+        default=DoorSettings.load().model,
         help="name or YAML file of the settings (default: those of the shipped weights)",
     )
     parser.add_argument("--rooms", type=whole_number(2), help="in place of the settings'")
@@ -86,6 +86,7 @@ def train(options: argparse.Namespace) -> None:
     fitting.fit()
     state = fitting.state
     metadata = {
+        "model": doors.model,
         "training": known["training"],
         "views": len(samples),
         "errors": {**state.epochs[-1], "samples": "rooms that never trained"},

@@ -1,6 +1,6 @@
 """Draw a kinematic model as its canonical camera sees it: at its limits, and with joints moved.
 
-Run as ``./run kmn_perception draw_model --model drawer --out drawer.png``.
+Run as ``./run kmn_perception draw_model --model NAME --out NAME.png``.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
+from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.model.camera import Camera
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.noisy_sensor import SENSORS
@@ -22,7 +23,8 @@ from kmn_sim.checks.settings import PerceptionCheckSettings
 def arguments(argv: list[str]) -> argparse.Namespace:
     """Parse the command line without its ROS arguments."""
     parser = argparse.ArgumentParser(prog="check_perception", description=__doc__)
-    parser.add_argument("--model", default="door", help="shipped name or file (default door)")
+    shipped = parameter_values("sim_node")["model"]
+    parser.add_argument("--model", default=shipped, help="name or file (default %(default)s)")
     parser.add_argument("--scenes", type=whole_number(1), default=20, help="default 20")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of scenes and noise")
     parser.add_argument("--noise", choices=("none", *SENSORS), default="none", help="default none")

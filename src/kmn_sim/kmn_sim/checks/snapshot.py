@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from kmn_perception.command_line.arguments import output_file, whole_number
+from kmn_perception.configuration.node_parameters import parameter_values
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_sim.sensors.settings import RecordingSettings
 from kmn_sim.sensors.snapshot import snapshot
@@ -21,7 +22,8 @@ from kmn_sim.world.simulation import Simulation
 def arguments() -> argparse.Namespace:
     """Parse the command line."""
     parser = argparse.ArgumentParser(prog="snapshot", description=__doc__)
-    parser.add_argument("--model", default="door", help="shipped name or file (default door)")
+    shipped = parameter_values("sim_node")["model"]
+    parser.add_argument("--model", default=shipped, help="name or file (default %(default)s)")
     for name in ("theta", "gamma"):
         parser.add_argument(
             f"--{name}", type=float, nargs="*", help="parameters; the prototype's if not given"

@@ -46,13 +46,14 @@ class Mechanism:
         masses = {name: each.mass for name, each in mechanics.bodies.items()}
         urdf = mechanism_urdf(scenario, object_cuboids(scenario, settings), masses)
         self.body = _load(physics, urdf, model.transformation.matrix(scenario.theta))
-        numbers = {joint.name: number for number, joint in enumerate(model.joints)}
+        infos = (physics.getJointInfo(self.body, n) for n in range(physics.getNumJoints(self.body)))
+        numbers = {info[1].decode(): info[0] for info in infos}  # not in the model's order
         self._links = {name: numbers[name] for name in self.joint_names}
-        for number, joint in enumerate(model.joints):
+        for joint in model.joints:
             surface = mechanics.bodies[joint.body]
             physics.changeDynamics(  # the defaults damp what shall swing freely
                 self.body,
-                number,
+                numbers[joint.name],
                 lateralFriction=surface.friction,
                 spinningFriction=surface.spinning_friction,
                 linearDamping=0.0,

@@ -18,7 +18,7 @@ Reason = Literal[
     # states of robot and door, controllers
     "no_states", "states_stopped", "stale_states", "another_world", "controller",
     # the motion
-    "tracking", "slipped", "missed_handle", "missed",
+    "tracking", "slipped", "missed_handle", "missed", "stuck",
     # a fault of the program
     "internal_error",
 ]  # fmt: skip
@@ -44,6 +44,20 @@ class GoalError(SkillError):
 
 class DoorError(SkillError):
     """There is no door to rely on."""
+
+
+class UncertainDoorError(DoorError):
+    """A door is seen, but not known well enough to be grasped.
+
+    Attributes
+    ----------
+    values
+        (n + m,) parameters that it roughly has.
+    """
+
+    def __init__(self, reason: Reason, text: str, values: NDArray[np.float64]) -> None:
+        super().__init__(reason, text)
+        self.values = values
 
 
 class StatesError(SkillError):

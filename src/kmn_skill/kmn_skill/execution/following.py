@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Final
 
 from kmn_skill.execution.errors import ExecutionError
 from kmn_skill.execution.goal import Client, Commands, Feedback, Goal
@@ -15,6 +16,7 @@ from kmn_skill.planning.plan import Plan
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
 RECENT = 0.2  # seconds; a robot on its way is elsewhere than older states have it
+STUCK: Final = "stuck"  # reason of an error
 HOLDING = (PhaseName.PRESS, PhaseName.OPEN)  # phases in which the hand holds the handle
 
 
@@ -46,6 +48,7 @@ class RobotFollowing:
         settings: ExecutionSettings,
     ) -> None:
         self._watch, self._held, self._memory = knowledge.watch, knowledge.held, knowledge.memory
+        self._force, self._action = knowledge.force, knowledge.model.actions[0]
         self._commands, self._client, self._settings = commands, client, settings
         self._breaks = self._watch.breaks
         self._followed: Execution | None = None  # while the robot is on its way
@@ -75,6 +78,8 @@ class RobotFollowing:
                 self._held.let_go()
             self._memory.keep_grip(self._held.grip)
             state = self._with_door(state)
+            if phase == PhaseName.OPEN:
+                self._check_force(state)
             through = self._commands.are_through()
             part, progress, finished = execution.step(self._commands.now(), state)
             finished &= through
@@ -86,7 +91,9 @@ class RobotFollowing:
         self._followed = None
 
     def reach(self, plan: Plan, check: Callable[[Goal], None]) -> None:
-        """Follow a plan, and check where it led; what slips off there has come there.
+        """Follow a plan, and check where it led; what slips off there and stays has come there.
+
+        So has what can be moved no further there.
 
         Parameters
         ----------
@@ -102,9 +109,11 @@ class RobotFollowing:
         try:
             self.follow(plan)
         except ExecutionError as error:
-            if error.reason != "slipped":
+            if error.reason not in ("slipped", STUCK):
                 raise
             self.hold()
+            if error.reason == "slipped" and self._held.falls_shut(self.hinge):
+                raise ExecutionError("slipped", f"{error}; it falls shut") from error
             slip = error
         try:
             check(Goal(self.handle, self.hinge))
@@ -130,6 +139,17 @@ class RobotFollowing:
             positions += measured.positions - followed.position(measured.time)
         self._commands.hold(positions)
         self._followed = None
+
+    def _check_force(self, state: WorldState) -> None:
+        """Raise if what the hand moves takes more force than its file allows."""
+        force = self._force.along(self._held.way(state.hinge), state.time)
+        joint, limit = self._action.joint, self._action.force_limit
+        if force > limit:
+            raise ExecutionError(
+                STUCK,
+                f"the {joint.name} is stuck at {state.hinge:.2f} {joint.unit}: it takes "
+                f"{force:.0f} N to move on, expected at most {limit:g} N",
+            )
 
     def state(self) -> WorldState:
         """Return the newest state.

@@ -24,11 +24,14 @@ class Goal(NamedTuple):
         Positions (m or rad) to which to move what unlatches the object, and then the object.
     object_id
         Number of the object, as its parameters have it; 0: whichever is seen.
+    action
+        Number of the action in the object's file, from 0.
     """
 
     unlatched: float
     target: float
     object_id: int = 0
+    action: int = 0
 
 
 class Result(NamedTuple):

@@ -90,7 +90,7 @@ def hinge_distance(
 def swung(model: KinematicModel, closed: NDArray[np.float64], seen: NDArray[np.float64]) -> float:
     """Return by how much (rad or m) a door of parameters (n + m,) moved until it is as it was seen.
 
-    A joint whose motion no parameters tell, as of a lid, is taken to have stayed.
+    A joint whose motion no parameters tell, as about a horizontal axis, is taken to have stayed.
     """
     joint = model.actions[0].joint
     before, now = (grasp_quantities(model, values) for values in (closed, seen))

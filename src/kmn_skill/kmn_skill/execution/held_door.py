@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -18,6 +19,8 @@ from kmn_skill.execution.errors import BlockedHandError, ExecutionError
 MISSED_HANDLE: Final = "missed_handle"  # reason of an error
 STEP = 1e-6  # radians, for derivatives
 STARTS = (-1.2, -0.6, 0.0, 0.6, 1.2)  # radians of the hinge, where nothing is known of it
+BEYOND = 0.3  # radians or metres beyond its limits, where no joint is
+LEVEL = 0.1  # metres that a handle rises on a metre of its way, which friction holds
 ITERATIONS = 6  # of Gauss-Newton, from the angles of some hundredths of a second ago
 
 
@@ -77,6 +80,8 @@ class HeldDoor:
     ) -> None:
         self._model, self._action, self.settings = model, action, settings
         self._pads, self._pad_width = pads, pad_width
+        limits = [joint.limits for joint in action.joints]
+        self._bounds = np.array([*limits, (0.0, 0.0)][:2]).T + [[-BEYOND], [BEYOND]]
         self._values: NDArray[np.float64] = np.zeros(len(model.parameters))
         self._angles = DoorAngles(0.0, 0.0)
         self._grip: Grip | None = None
@@ -179,6 +184,31 @@ class HeldDoor:
         self._angles = self._solve(pads, grip.points, self._angles)
         return self._angles
 
+    def way(self, hinge: float) -> NDArray[np.float64]:
+        """Return whereto (3,) the handle of a door that is so far open moves as it opens further.
+
+        Parameters
+        ----------
+        hinge
+            By which it is open, radians or metres.
+
+        Returns
+        -------
+        NDArray
+            Of length 1, world frame.
+        """
+        theta, gamma = self._model.split(self._values)
+        place = np.array([*self._action.grasp.place(gamma), 1.0])
+        step = math.copysign(STEP, hinge or self._action.target)
+        here, there = (self._motion(np.array([at, 0.0])) @ place for at in (hinge, hinge + step))
+        turn = self._model.transformation.matrix(theta)[:3, :3]
+        moved: NDArray[np.float64] = turn @ (there - here)[:3]
+        return moved / np.linalg.norm(moved)
+
+    def falls_shut(self, hinge: float) -> bool:
+        """Tell whether its weight shuts a door that is so far open (rad or m), as a chest's."""
+        return bool(self.way(hinge)[2] > LEVEL)
+
     def _is_lost(self, width: float, grip: Grip) -> bool:
         """Tell whether fingers so far apart (m) do not hold the handle any more."""
         return abs(width - grip.width) > self.settings.max_grip_change * grip.width
@@ -196,7 +226,7 @@ class HeldDoor:
             ]
             left = (pads - here).ravel()
             change, *_ = np.linalg.lstsq(np.array(slopes).T, left, rcond=None)
-            angles = angles + change
+            angles = np.clip(angles + change, *self._bounds)
         return DoorAngles(*angles.tolist())
 
     def _moved(

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_memory import DoorMemory
+from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.states import StateWatch
@@ -25,6 +26,8 @@ class Knowledge(NamedTuple):
         Of the states of the robot, and of the door where an encoder tells them.
     held
         The door's angles where no encoder tells them.
+    force
+        Of the hand on what it holds.
     wall
         Around the door, where there is one.
     """
@@ -34,4 +37,5 @@ class Knowledge(NamedTuple):
     memory: DoorMemory
     watch: StateWatch
     held: HeldDoor
+    force: HandForce
     wall: SurroundingsSettings

@@ -17,16 +17,16 @@ from kmn_skill.execution.errors import (
     SkillError,
     StatesError,
 )
-from kmn_skill.execution.following import RobotFollowing
+from kmn_skill.execution.following import STUCK, RobotFollowing
 from kmn_skill.execution.goal import SUCCESS, Client, Commands, Goal, Outcome, Result
 from kmn_skill.execution.goal_check import check_goal, check_reached
 from kmn_skill.execution.grasp_quantities import hinge_distance, swung, with_handle_moved
 from kmn_skill.execution.held_door import MISSED_HANDLE
 from kmn_skill.execution.knowledge import Knowledge
+from kmn_skill.execution.looking import Looking
 from kmn_skill.execution.opening_settings import OpeningSettings
 from kmn_skill.execution.plan_execution import ExecutionSettings
 from kmn_skill.execution.states import WorldState
-from kmn_skill.planning.look import before_door
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import Plan, PlanningCancelled, PlanningFailed, PlanReport, PlanRequest
 from kmn_skill.planning.planner import Planner
@@ -34,7 +34,6 @@ from kmn_skill.planning.surroundings import WALL, Obstacle, wall_around
 
 POLL_PERIOD = 0.05  # seconds between two looks for a cancellation
 ELSEWHERE = ("slipped", "missed", MISSED_HANDLE)  # reasons why the door may not be where it was
-FROM_NEAR, FROM_AFAR = "from near", "from afar"  # whence a goal has looked at the door
 # Why a door that the robot hides from the camera is not to be relied on.
 HIDDEN = ("status", "out_of_limits", "few_frames", "disagreement", "uncertain")
 
@@ -63,11 +62,13 @@ class DoorOpening:
         settings: OpeningSettings,
         execution: ExecutionSettings,
     ) -> None:
-        self._model, self._door, self._memory, self._watch, self._held, self._wall = knowledge
+        self._model, self._door, self._memory = knowledge.model, knowledge.door, knowledge.memory
+        self._watch, self._held, self._wall = knowledge.watch, knowledge.held, knowledge.wall
         self._action = self._model.actions[0]
         self._planner, self._commands, self._client = planner, commands, client
         self._settings = settings
         self._robot = RobotFollowing(knowledge, commands, client, execution)
+        self._looking = Looking(knowledge, planner, commands, self._robot, settings)
         self._plan_report: PlanReport | None = None
         self._attempts = 0
 
@@ -100,25 +101,34 @@ class DoorOpening:
         for retries_left in reversed(range(settings.retries + 1)):
             try:
                 if is_elsewhere and self._planner.drives:
-                    self._look_again(values)
+                    self._looking.again(values)
                     self._memory.forget()
                     values = self._wait_for_door(values)
+                if self._is_there(goal):
+                    self._commands.tell("it is open as far as it is to be opened already")
+                    return
                 self._robot.reach(self._plan(values, goal), check)
                 return
             except ExecutionError as error:
                 self._robot.hold()
-                if not retries_left:
+                if not retries_left or error.reason == STUCK:
                     raise
                 if isinstance(error, BlockedHandError):
                     values, is_elsewhere = self._felt(values, error.offset(blocked)), False
                     blocked = error
                     self._commands.tell(f"{error}; trying again where the fingers found it")
                     continue
-                is_elsewhere |= self._carries_camera or error.reason in ELSEWHERE
+                is_elsewhere |= self._looking.carries_camera or error.reason in ELSEWHERE
                 again, setback = "looking" if is_elsewhere else "trying", str(error)
                 self._commands.tell(f"{error}; {again} again from here")
             except DoorError as error:
                 raise DoorError(error.reason, f"{error}; before, {setback}") from error
+
+    def _is_there(self, goal: Goal) -> bool:
+        """Tell whether what is to be opened is at its target, and does not fall shut."""
+        hinge = self._robot.state().hinge
+        is_near = abs(hinge - goal.target) <= self._settings.door_tolerance
+        return is_near and not self._held.falls_shut(hinge)
 
     def _felt(
         self, values: NDArray[np.float64], offset: NDArray[np.float64]
@@ -127,16 +137,6 @@ class DoorOpening:
         felt = with_handle_moved(self._model, values, self._door.covariance, offset)
         self._held.see(felt, self._robot.state().hinge)
         return felt
-
-    @property
-    def _carries_camera(self) -> bool:
-        """Whether the robot sees the door better from elsewhere."""
-        return self._settings.look_distance > 0.0
-
-    @property
-    def _view_distance(self) -> float:
-        """Metres from the door at which the robot does not hide it."""
-        return self._settings.look_distance or self._settings.retreat_distance
 
     def _wait_for_door(self, closed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Return the parameters (n + m,) of the door when closed; move to see it if need be.
@@ -147,19 +147,19 @@ class DoorOpening:
             (n + m,) of the closed door, if this goal knew it before.
         """
         deadline = time.monotonic() + self._settings.door_timeout
-        looked = set() if self._carries_camera else {FROM_NEAR}
-        if not self._planner.drives:
-            looked = {FROM_AFAR, FROM_NEAR}  # in vain
         while True:
             self._robot.begin()  # until now the world may have changed
             try:
                 state = self._robot.state()
                 self._robot.report(PhaseName.WAIT, 0.0, state)
                 self._remember(state)
-                if not self._move_to_see(state, looked):
+                if not self._looking.move_to_see(state):
                     return self._door_from(state, closed)
                 deadline = time.monotonic() + self._settings.door_timeout
-            except (StatesError, DoorError, ExecutionError):
+            except DoorError as error:
+                if time.monotonic() > deadline:
+                    raise self._looking.reason(error) from error
+            except (StatesError, ExecutionError):
                 if time.monotonic() > deadline:
                     raise
             time.sleep(POLL_PERIOD)
@@ -177,62 +177,11 @@ class DoorOpening:
         else:
             self._held.resume(kept.values, kept.grip, state.robot)
 
-    def _move_to_see(self, state: WorldState, looked: set[str]) -> bool:
-        """Move once to see the door, or its handle, from elsewhere; tell whether it was needed."""
-        now = self._commands.now()
-        roughly = self._door.roughly(now)
-        if FROM_AFAR not in looked and self._memory.kept is None and roughly is not None:
-            looked.add(FROM_AFAR)
-            if self._is_at(roughly, state):
-                self._commands.tell("the robot is at the door and may hide it; drawing back")
-                self._look(roughly, self._before(roughly))
-                return True
-        seen, why = self._door.without_handle(now), "no handle to grasp is seen from here"
-        if seen is None and self._settings.look_first:
-            seen, why = roughly, "the door was seen from afar"
-        if FROM_NEAR not in looked and seen is not None:
-            looked.add(FROM_NEAR)
-            self._commands.tell(f"{why}; looking from near")
-            self._look(seen, self._before(seen))
-            return True
-        return False
-
-    def _is_at(self, values: NDArray[np.float64], state: WorldState) -> bool:
-        """Tell whether the robot is at a door of parameters (n + m,)."""
-        try:
-            reach = self._planner.reach(values, state.robot)
-        except PlanningFailed as error:
-            raise SkillError("no_plan", str(error)) from error
-        return reach > -self._settings.look_clearance
-
-    def _look_again(self, values: NDArray[np.float64]) -> None:
-        """Draw back from a door of parameters (n + m,) to where it was seen from, or before it."""
-        kept = self._memory.kept
-        if kept is None or self._carries_camera:
-            self._look(values, self._before(values))
-        else:
-            self._look(values, kept.robot)
-
-    def _before(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where (J,) the robot stands before a door of parameters (n + m,) to see it."""
-        robot = self._robot.state().robot
-        return before_door(self._model, values, robot, self._view_distance)
-
-    def _look(self, values: NDArray[np.float64], place: NDArray[np.float64]) -> None:
-        """Drive to positions (J,) from where a door of parameters (n + m,) can be seen."""
-        start = self._robot.state().robot
-        try:
-            plan = self._planner.look(values, start, place, self._settings.look_clearance)
-        except PlanningFailed as error:
-            raise SkillError("no_plan", str(error)) from error
-        self._robot.follow(plan)
-        self._door.forget(self._commands.now())  # what it hid on the way
-
     def _door_from(
         self, state: WorldState, closed: NDArray[np.float64] | None
     ) -> NDArray[np.float64]:
         """Return the parameters (n + m,) of the closed door, as seen before the robot hid it."""
-        hidden = math.inf if self._carries_camera else self._settings.hidden_distance
+        hidden = math.inf if self._looking.carries_camera else self._settings.hidden_distance
         before = self._memory.recall(state.robot, hidden)
         try:
             seen = self._door.values(self._commands.now())

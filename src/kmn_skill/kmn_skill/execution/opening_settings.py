@@ -14,8 +14,11 @@ class OpeningSettings:
     door_timeout
         Seconds that a goal waits for parameters to rely on.
     look_distance
-        Metres from which the robot looks at a door whose handle it did not see, or has lost; 0
-        where its camera stands elsewhere and sees no more from there.
+        Metres from which the robot looks at a door whose handle it did not see, does not know well
+        enough, or has lost; 0 where its camera stands elsewhere and sees no more from there.
+    looks, look_nearer
+        From how many places it looks at most before each grasp, and at which part of the distance
+        of the one before each further one is.
     look_first
         Whether it looks from there before each grasp.
     memory_age
@@ -40,6 +43,8 @@ class OpeningSettings:
 
     door_timeout: float
     look_distance: float
+    looks: int
+    look_nearer: float
     look_first: bool
     retreat_distance: float
     memory_age: float

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_observation import DoorObservation
-from kmn_skill.execution.errors import DoorError
+from kmn_skill.execution.errors import DoorError, UncertainDoorError
 from kmn_skill.execution.grasp_quantities import YAW, grasp_deviations, grasp_quantities
 
 HANDLE_NOT_SEEN: Final = "handle_not_seen"  # reason for which a door is not usable
@@ -152,7 +152,7 @@ class PerceivedDoor:
         Raises
         ------
         DoorError
-            If there are none to rely on.
+            If there are none to rely on; `UncertainDoorError` if a nearer look may help.
         """
         settings, model = self.settings, self._model
         with self._lock:
@@ -167,16 +167,17 @@ class PerceivedDoor:
                 f"{len(kept)} usable frame(s) in a row, "
                 f"expected {settings.min_consistent_frames}{before}",
             )
+        values: NDArray[np.float64] = np.mean([each.values for each in kept], axis=0)
         quantities = np.array([grasp_quantities(model, each.values) for each in kept])
         spread = np.ptp(quantities, axis=0)
         distance, angle = float(spread[: YAW.start].max()), float(spread[YAW].max())
         if distance > settings.max_distance or angle > settings.max_angle:
-            raise DoorError(
+            raise UncertainDoorError(
                 "disagreement",
                 f"the last {len(kept)} frames differ by {distance:.3f} m and {angle:.3f} rad, "
                 f"expected at most {settings.max_distance:g} m and {settings.max_angle:g} rad",
+                values,
             )
-        values: NDArray[np.float64] = np.mean([each.values for each in kept], axis=0)
         covariance = np.mean([each.covariance for each in kept], axis=0)
         self._check_certainty(values, covariance)
         self.covariance = covariance
@@ -270,10 +271,11 @@ class PerceivedDoor:
         limits = settings.max_handle_std, settings.max_hinge_std, settings.max_yaw_std
         for what, deviation, allowed in zip(("handle", "hinge", "yaw"), found, limits, strict=True):
             if deviation > allowed:
-                raise DoorError(
+                raise UncertainDoorError(
                     "uncertain",
                     f"the standard deviation of the {what} is {deviation:.4f}, "
                     f"expected at most {allowed:g} [m, rad]",
+                    values,
                 )
 
 

@@ -19,6 +19,7 @@ from tqdm import tqdm
 from kmn_perception.command_line.arguments import output_file, whole_number
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.parts import WORLD
+from kmn_skill.experiments.action_option import add_action_option, chosen_action
 from kmn_skill.experiments.settings import (
     Experiment,
     add_object_option,
@@ -178,10 +179,12 @@ def main() -> int:
     parser.add_argument("--tries", type=whole_number(1), default=20, help="guesses, default 20")
     add_robot_option(parser)
     add_object_option(parser)
+    add_action_option(parser)
     options = parser.parse_args()
     try:
         experiment = Experiment.load()
-        setup = PlanningSetup.load(experiment.kinematic_model(options.object), options.robot)
+        model = chosen_action(experiment.kinematic_model(options.object), options.action)
+        setup = PlanningSetup.load(model, options.robot)
         solver = Solver(setup)
         free = free_solutions(solver, setup, experiment, options.tries)
         solutions = {mode: [solution] for mode, solution in free.items()}

@@ -17,6 +17,7 @@ from kmn_perception.command_line.arguments import whole_number
 from kmn_perception.command_line.columns import columns
 from kmn_perception.configuration.hashes import short_hash
 from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
+from kmn_skill.experiments.action_option import add_action_option, chosen_action
 from kmn_skill.experiments.settings import (
     Experiment,
     add_mode_option,
@@ -123,6 +124,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--room", action="store_true", help="the doors stand in walls")
     add_robot_option(parser)
     add_object_option(parser)
+    add_action_option(parser)
     return parser
 
 
@@ -130,6 +132,7 @@ def prepare(options: argparse.Namespace) -> SharedExperiment[Planned]:
     """Return the experiment that the options tell."""
     experiment = Experiment.load()
     model = experiment.kinematic_model(options.object, options.room)
+    model = chosen_action(model, options.action)
     setup = PlanningSetup.load(model, options.robot)
     options.mode = chosen_mode(setup.action, options.mode)
     doors = experiment.random_objects(model, options.room, options.doors, options.seed)
@@ -138,7 +141,7 @@ def prepare(options: argparse.Namespace) -> SharedExperiment[Planned]:
     def conclude(planned: list[Planned]) -> tuple[str, Any]:
         result = tally(planned)
         named = {name: getattr(options, name) for name in ("robot", "mode", "seed", "room")}
-        return table(result), {**named, "object": model.name, **result}
+        return table(result), {**named, "object": model.name, "action": setup.action.name, **result}
 
     return SharedExperiment(
         title="plan_doors",

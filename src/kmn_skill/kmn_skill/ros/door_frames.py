@@ -14,6 +14,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
+from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.reports import ThrottledWarnings
 from kmn_perception.ros.stamps import NANOSECONDS
 from kmn_perception.ros.transforms import TransformListener
@@ -78,6 +79,22 @@ class DoorFrames:
         """Return the pose (4, 4) of a base that stands; raise ``TransformError`` if unknown."""
         self._listener.listen(True)
         return self._listener.lookup(self._frame, self.settings.base_frame, 0)
+
+    def turned(self, force: NDArray[np.float64], frame: str) -> NDArray[np.float64]:
+        """Return a force (3,) of any frame in the robot's; raise ``MessageError`` if unknown."""
+        if frame.lstrip("/") == self._frame:
+            return force
+        self._listener.listen(True)
+        try:
+            turn = self._listener.lookup(self._frame, frame.lstrip("/"), 0)[:3, :3]
+        except TransformError as error:
+            raise MessageError(
+                "force_frame",
+                f"the force is given in '{frame}', and where that is in '{self._frame}' is not "
+                f"known: {error}",
+            ) from error
+        turned: NDArray[np.float64] = turn @ force
+        return turned
 
     def _is_elsewhere(self, observation: DoorObservation) -> bool:
         """Tell whether an observation is of use, but in another frame."""

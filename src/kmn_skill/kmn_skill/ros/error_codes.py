@@ -36,6 +36,7 @@ NAMES: dict[Outcome, str] = {
     "missed_handle": "MISSED_HANDLE",
     "slipped": "SLIPPED",
     "missed": "MISSED_GOAL",
+    "stuck": "STUCK",
     "internal_error": "INTERNAL_ERROR",
 }
 

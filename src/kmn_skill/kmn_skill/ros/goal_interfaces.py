@@ -6,7 +6,6 @@ import math
 from typing import Any, Protocol
 
 from kmn_msgs.action import OpenDoor, OperateJoint
-from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.errors import GoalError
 from kmn_skill.execution.goal import SUCCESS, Feedback, Goal, Result
@@ -65,26 +64,37 @@ class OperateJointInterface:
 
     Parameters
     ----------
-    model, action
-        What the server can do.
+    model
+        What can be done with it, by its actions.
     """
 
     type, name = OperateJoint, "operate_joint"
 
-    def __init__(self, model: KinematicModel, action: Action) -> None:
-        self._model, self._action = model, action
+    def __init__(self, model: KinematicModel) -> None:
+        self._model = model
 
     def goal(self, request: OperateJoint.Goal) -> Goal:
         """Read a goal; raise ``GoalError`` if it is for another object or joint."""
-        action = self._action
+        model = self._model
+        joints = dict.fromkeys(action.joint.name for action in model.actions)
         for what, asked, known in (
-            ("model", request.model, self._model.name),
-            ("joint", request.joint, action.joint.name),
+            ("model", request.model, [model.name]),
+            ("joint", request.joint, list(joints)),
         ):
-            if asked not in ("", known):
-                raise GoalError("bad_goal", f"{what} '{asked}' is asked for, expected '{known}'")
+            if asked not in ("", *known):
+                expected = " or ".join(f"'{name}'" for name in known)
+                raise GoalError("bad_goal", f"{what} '{asked}' is asked for, expected {expected}")
+        number = self._chosen(request.joint or model.actions[0].joint.name, request.target)
+        action = model.actions[number]
         target = action.target if math.isnan(request.target) else request.target
-        return Goal(action.unlatched, target, request.object_id)
+        return Goal(action.unlatched, target, request.object_id, number)
+
+    def _chosen(self, joint: str, target: float) -> int:
+        """Return the number of a joint's first action, to the target's side if one is."""
+        actions = self._model.actions
+        of_joint = [number for number, each in enumerate(actions) if each.joint.name == joint]
+        to_side = [number for number in of_joint if actions[number].target * target > 0.0]
+        return [*to_side, *of_joint][0]
 
     def result(self, result: Result) -> OperateJoint.Result:
         """Make the message of a result."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from control_msgs.msg import JointTolerance
-from geometry_msgs.msg import Point, Twist, Vector3
+from geometry_msgs.msg import Point, Twist, Vector3, WrenchStamped
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
@@ -62,6 +62,15 @@ def observation_from_message(message: MorphingParameters, hinge: str) -> DoorObs
         recess=_told(message.surroundings_names, message.surroundings, RECESS),
         hinge=_told(message.joint_names, message.joint_positions, hinge),
     )
+
+
+def force_from_wrench(message: WrenchStamped) -> NDArray[np.float64]:
+    """Read a force (3,), newtons; raise ``MessageError`` if it is not finite."""
+    force = message.wrench.force
+    read = np.array([force.x, force.y, force.z])
+    if not np.isfinite(read).all():
+        raise MessageError("force_not_finite", f"the force is not finite: {read.tolist()}")
+    return read
 
 
 def _told(names: Sequence[str], values: Sequence[float], name: str) -> float:

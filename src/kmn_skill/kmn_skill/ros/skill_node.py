@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
@@ -32,10 +34,7 @@ from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.goal import Goal, Result
-from kmn_skill.execution.held_door import HeldDoor
-from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.opening import DoorOpening
-from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import BASE, StateWatch
 from kmn_skill.planning.plan import Plan
@@ -43,6 +42,7 @@ from kmn_skill.planning.planner import Planner
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.ros import messages
+from kmn_skill.ros.action_skill import ActionSkill
 from kmn_skill.ros.controls import make_control
 from kmn_skill.ros.door_frames import DoorFrames
 from kmn_skill.ros.goal_client import GoalClient
@@ -69,35 +69,26 @@ class SkillNode(OverridableNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("skill_node", **options)
         self._settings = settings = SkillNodeSettings.check(declare_parameters(self, "skill_node"))
-        setup = PlanningSetup.load(settings.model, settings.robot)
-        self._action = setup.action
+        numbers = range(len(settings.model.actions))
+        setups = [PlanningSetup.load(settings.model.doing(n), settings.robot) for n in numbers]
+        setup = setups[0]
         door_joints = tuple(joint.name for joint in setup.action.joints)
         measured = door_joints if settings.door_angles == ENCODERS else ()
         self._warnings, self._refusals = ThrottledWarnings(self), ChangeWarnings(self)
-        self._frames = DoorFrames(self, self._warnings, settings, self._use)
-        self._states = StateReader(setup.robot, measured, self._frames.base_pose)
+        self._frames = [
+            DoorFrames(self, self._warnings, settings, partial(self._use, number))
+            for number in numbers
+        ]
+        self._states = StateReader(setup.robot, measured, self._frames[0].base_pose)
         self._control = make_control(
             self, setup.robot, self._states.odometry, lambda: self._settings, self.now
         )
         self._ending = ExitStack()
-        planner = Planner(
-            setup, Prototypes.load(setup.action.motions, settings.robot), settings.planning_time
+        self._watch = StateWatch(
+            settings.states, self._states.joints, continuous=setup.robot.continuous
         )
-        self._planner = self._ending.enter_context(planner)
-        self._knowledge = Knowledge(
-            settings.model,
-            PerceivedDoor(settings.model, settings.world_frame, settings.door),
-            DoorMemory(self._memory_file(setup), self.tell),
-            StateWatch(settings.states, self._states.joints, continuous=setup.robot.continuous),
-            HeldDoor(
-                settings.model,
-                setup.action,
-                planner.pads,
-                setup.robot.planning.pads.width,
-                settings.grip,
-            ),
-            setup.settings.surroundings,
-        )
+        self._skills = [self._make_skill(each) for each in setups]
+        self._skill = self._skills[0]  # of the goal that is pursued
         self._statistics = SkillStatistics()
         self._connect()
         self.add_on_set_parameters_callback(self._on_parameters)
@@ -123,7 +114,8 @@ class SkillNode(OverridableNode):
 
     def show(self, plan: Plan, values: NDArray[np.float64]) -> None:
         """Publish a plan as markers."""
-        report, model = plan.report, self._settings.model
+        report, setup = plan.report, self._skill.setup
+        model = setup.model
         self._statistics.plan(report.planning_time)
         door = ", ".join(
             f"{parameter.name} {value:.3f}"
@@ -135,7 +127,7 @@ class SkillNode(OverridableNode):
         )
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.world_frame)
         self._path_publisher.publish(messages.markers_from_plan(plan, model, values, header))
-        self._plan_publisher.publish(messages.trajectory_from_plan(plan, self._action, header))
+        self._plan_publisher.publish(messages.trajectory_from_plan(plan, setup.action, header))
 
     def send(self, part: Part) -> None:
         """Send a part of a plan."""
@@ -153,15 +145,23 @@ class SkillNode(OverridableNode):
         """Log a warning."""
         self.get_logger().warning(text)
 
+    def _make_skill(self, setup: PlanningSetup) -> ActionSkill:
+        settings = self._settings
+        motions = Prototypes.load(setup.action.motions, settings.robot)
+        planner = self._ending.enter_context(Planner(setup, motions, settings.planning_time))
+        memory = DoorMemory(self._memory_file(setup), self.tell)
+        return ActionSkill.make(setup, planner, settings, memory, self._watch)
+
     def _memory_file(self, setup: PlanningSetup) -> Path:
         """Return the file in which this node keeps the door, beside the logs of ROS.
 
-        It is of one model, robot and frame: numbers of another one would look alike.
+        It is of one action, robot and frame: numbers of another one would look alike.
         """
         home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
         name = self.get_fully_qualified_name().strip("/").replace("/", ".")
         frame = self._settings.world_frame.replace("/", "_")
-        of = f"{self.context.get_domain_id()}.{setup.model.name}.{setup.robot.name}.{frame}"
+        done = f"{setup.model.name}.{setup.action.name}"
+        of = f"{self.context.get_domain_id()}.{done}.{setup.robot.name}.{frame}"
         return Path(home) / "kmn_skill" / f"{name}.{of}.json"
 
     def _connect(self) -> None:
@@ -174,10 +174,12 @@ class SkillNode(OverridableNode):
         self.create_subscription(
             MorphingParameters, "morphing_parameters", self._on_parameters_of_door, QUEUE_DEPTH
         )
+        if any(math.isfinite(each.force_limit) for each in self._settings.model.actions):
+            self.create_subscription(WrenchStamped, "handle_force", self._on_force, QUEUE_DEPTH)
         report_periodically(self, self._report)
         self._server = GoalServer(
             self,
-            (OpenDoorInterface(), OperateJointInterface(self._settings.model, self._action)),
+            (OpenDoorInterface(), OperateJointInterface(self._settings.model)),
             self._pursue,
             self._statistics,
             self._warnings,
@@ -193,38 +195,52 @@ class SkillNode(OverridableNode):
         self._refusals.clear(topic)
         if sample is None:
             return
-        knowledge = self._knowledge
-        watch = knowledge.watch
+        watch = self._watch
         breaks = watch.breaks
         watch.put(topic, sample)
         if watch.breaks != breaks:
-            knowledge.door.forget(sample.time)
-            knowledge.held.let_go()
-            knowledge.memory.forget()
+            for skill in self._skills:
+                skill.forget(sample.time)
             self._warnings.warn("break", f"another world: {watch.last_break}")
 
-    def _on_parameters_of_door(self, message: MorphingParameters) -> None:
-        observation = messages.observation_from_message(message, self._action.joint.name)
-        self._frames.take(observation, message.header.stamp)
-
-    def _use(self, observation: DoorObservation) -> None:
+    def _on_force(self, message: WrenchStamped) -> None:
         try:
-            self._knowledge.door.add(observation)
-        except DoorError as error:
-            self._refuse("morphing_parameters", error.reason, error)
+            force = messages.force_from_wrench(message)
+            force = self._frames[0].turned(force, message.header.frame_id)
+        except MessageError as error:
+            self._refuse("handle_force", error.reason, error)
         else:
-            self._refusals.clear("morphing_parameters")
-            self._statistics.use()
+            self._refusals.clear("handle_force")
+            for skill in self._skills:
+                skill.knowledge.force.put(seconds(message.header.stamp), force)
+
+    def _on_parameters_of_door(self, message: MorphingParameters) -> None:
+        for skill, frames in zip(self._skills, self._frames, strict=True):
+            joint = skill.setup.action.joint.name
+            observation = messages.observation_from_message(message, joint)
+            frames.take(observation, message.header.stamp)
+
+    def _use(self, number: int, observation: DoorObservation) -> None:
+        """Let an action's skill have an observation; it is counted once."""
+        try:
+            self._skills[number].knowledge.door.add(observation)
+        except DoorError as error:
+            if not number:
+                self._refuse("morphing_parameters", error.reason, error)
+        else:
+            if not number:
+                self._refusals.clear("morphing_parameters")
+                self._statistics.use()
 
     def _pursue(self, goal: Goal, client: GoalClient) -> Result:
         """Pursue a goal to its result."""
-        settings = self._settings
-        if self._knowledge.door.choose(goal.object_id):
-            self._knowledge.memory.forget()  # of whichever object that was
-        opening = DoorOpening(
-            self._knowledge, self._planner, self, client, settings.opening, settings.execution
+        self._skill = skill = self._skills[goal.action]
+        opening, execution = self._settings.of(skill.setup.action.joint)
+        if skill.knowledge.door.choose(goal.object_id):
+            skill.knowledge.memory.forget()  # of whichever object that was
+        return DoorOpening(skill.knowledge, skill.planner, self, client, opening, execution).run(
+            goal
         )
-        return opening.run(goal)
 
     def _refuse(self, topic: str, reason: str, error: Exception) -> None:
         self._statistics.refuse(reason)
@@ -232,7 +248,7 @@ class SkillNode(OverridableNode):
 
     def _report(self) -> list[DiagnosticStatus]:
         try:
-            self._knowledge.door.values(self.now())
+            self._skill.knowledge.door.values(self.now())
             doubt = ""
         except DoorError as error:
             doubt = str(error)
@@ -248,10 +264,10 @@ class SkillNode(OverridableNode):
         except (OSError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
-        self._knowledge.door.settings = settings.door
-        self._frames.settings = settings
-        self._knowledge.watch.settings = settings.states
-        self._knowledge.held.settings = settings.grip
+        self._watch.settings = settings.states
+        for skill, frames in zip(self._skills, self._frames, strict=True):
+            skill.take(settings)
+            frames.settings = settings
         return SetParametersResult(successful=True)
 
 

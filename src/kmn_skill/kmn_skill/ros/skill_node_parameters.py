@@ -9,7 +9,7 @@ from typing import Any
 
 from kmn_perception.configuration.node_parameters import ParameterError, pick
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.model.parts import PRISMATIC
+from kmn_perception.model.parts import PRISMATIC, Joint
 from kmn_skill.execution.base_motion import TrackingSettings
 from kmn_skill.execution.held_door import GripSettings
 from kmn_skill.execution.opening_settings import OpeningSettings
@@ -51,6 +51,8 @@ class SkillNodeSettings:
         Who tells the door's angles: `ENCODERS`, or the hand that holds the handle.
     door, states, grip, tracking, execution, opening
         Settings of the six.
+    slide_slip, slide_tolerance
+        Of what slides, metres, in place of ``door_slip`` and ``door_tolerance``.
     """
 
     model: KinematicModel
@@ -70,6 +72,15 @@ class SkillNodeSettings:
     tracking: TrackingSettings
     execution: ExecutionSettings
     opening: OpeningSettings
+    slide_slip: float
+    slide_tolerance: float
+
+    def of(self, joint: Joint) -> tuple[OpeningSettings, ExecutionSettings]:
+        """Return the settings by which a joint is moved."""
+        if joint.type != PRISMATIC:
+            return self.opening, self.execution
+        opening = replace(self.opening, door_tolerance=self.slide_tolerance)
+        return opening, replace(self.execution, door_slip=self.slide_slip)
 
     @classmethod
     def check(cls, values: Mapping[str, Any]) -> SkillNodeSettings:
@@ -87,9 +98,6 @@ class SkillNodeSettings:
                 "none"
             )
         execution, opening = pick(ExecutionSettings, values), pick(OpeningSettings, values)
-        if model.actions[0].joint.type == PRISMATIC:
-            execution = replace(execution, door_slip=values["slide_slip"])
-            opening = replace(opening, door_tolerance=values["slide_tolerance"])
         if values["control"] != TOPIC:
             execution = replace(execution, part_duration=math.inf)
         return cls(
@@ -110,4 +118,6 @@ class SkillNodeSettings:
             tracking=pick(TrackingSettings, values),
             execution=execution,
             opening=opening,
+            slide_slip=values["slide_slip"],
+            slide_tolerance=values["slide_tolerance"],
         )

@@ -65,7 +65,8 @@ class FusionMeasurement:
     """Finds the door in each frame of a room, and fuses them."""
 
     def __init__(self) -> None:
-        self._finder, self._model = DoorFinder.load(), RoomModel.load("room_door")
+        self._finder = DoorFinder.load()
+        self._model = RoomModel.load(self._finder.settings.model)
         self._limits = DoorErrorSettings.load()
 
     def measure(self, seed: int, frames: int, camera: Camera) -> RoomFrames:

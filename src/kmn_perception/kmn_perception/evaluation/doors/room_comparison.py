@@ -24,7 +24,6 @@ from kmn_perception.evaluation.doors.settings import DoorErrorSettings, RoomEval
 from kmn_perception.evaluation.methods import MethodError
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.model.room_model import RoomModel
-from kmn_perception.network import wall_weights
 from kmn_perception.network.weight_file import WeightsError
 from kmn_perception.rooms import frame as rendered
 from kmn_perception.rooms.label import label
@@ -159,7 +158,7 @@ class RoomComparison:
 
     def _with_network(self) -> DoorFinder | None:
         """Return the finder; None where the shipped network is missing, and was not asked for."""
-        given, methods = self._request.weights or wall_weights.MODEL, self._request.methods
+        given, methods = self._request.weights or DoorSettings.load().model, self._request.methods
         try:
             loaded = DoorFinder.load(given)
         except WeightsError as error:

@@ -22,7 +22,6 @@ from kmn_perception.experiments.experiment import load_pipeline
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.model.room_model import RoomModel
 
-MODEL = "room_door"
 WITH_COLOUR, WITHOUT_NETWORK, DEPTH_ALONE = "with_colour", "without_network", "depth_alone"
 MODES = (WITH_COLOUR, WITHOUT_NETWORK, DEPTH_ALONE)
 MASKED = "masked_pipeline"
@@ -79,7 +78,7 @@ class DoorExperiment:
     def __init__(self, settings: ExperimentSettings, doors: DoorSettings) -> None:
         self.settings, self.doors = settings, doors
         self._limits = DoorErrorSettings.load()
-        self.model, self.network = RoomModel.load(MODEL), DoorFinder.load().network
+        self.model, self.network = RoomModel.load(doors.model), DoorFinder.load().network
         self.pipeline = load_pipeline()
 
     def run(self, frame: DoorFrame) -> DoorResult:

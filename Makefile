@@ -81,6 +81,13 @@ docs: $(READY)docs  ## build the documents as a site in outputs/site; broken lin
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build
 	@echo "==> outputs/site/index.html; with its search: .venv/bin/mkdocs serve"
 
+UPGRADE :=
+
+.PHONY: pins
+pins: $(READY)pins  ## write versions and hashes of all requirements into constraints.txt (UPGRADE=all or NAME...)
+	@.venv/bin/uv pip compile --quiet requirements*.txt --output-file constraints.txt \
+	    $(if $(filter all,$(UPGRADE)),--upgrade,$(UPGRADE:%=--upgrade-package %))
+
 .PHONY: parameter-tables
 parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
 	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
@@ -104,7 +111,7 @@ ifneq ($(ROS),$(shell cat .venv/ros 2>/dev/null))
 $(READY)nodes: mode
 endif
 
-$(READY)nodes: requirements.txt requirements-ros.txt constraints.txt tools/setup.sh
+$(READY)nodes: requirements.txt requirements-ros.txt constraints.txt torch-cpu.txt tools/setup.sh
 	@tools/setup.sh nodes $(ROS)
 	@touch $@
 

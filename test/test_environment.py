@@ -46,8 +46,10 @@ def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
     "command",
     [
         "./run kmn_perception replay",
-        "make --silent --old-file=build --old-file=lint --old-file=.venv/.ready-simulation "
-        "--old-file=.venv/.ready-browser --old-file=.venv/.ready-docs test",
+        "make --silent --old-file=build --old-file=compiling --old-file=lint "
+        "--old-file=.venv/.ready-simulation "
+        "--old-file=.venv/.ready-browser --old-file=.venv/.ready-cluster "
+        "--old-file=.venv/.ready-docs test",
     ],
 )
 def test_programs_and_tests_start_without_another_ros(command: str, tmp_path: Path) -> None:

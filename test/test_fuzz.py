@@ -23,28 +23,17 @@ def fuzz(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_every_kind_of_file_is_read_or_refused(tmp_path: Path) -> None:
-    done = fuzz(tmp_path, "--what", "files", "--cases", "130", "--seed", "7")
+    done = fuzz(tmp_path, "--what", "files", "--cases", "260", "--seed", "7")
     assert done.returncode == 0, done.stdout + done.stderr
     *_, last = done.stdout.splitlines()
     name, cases, refused, accepted, *_, faults = last.split()
-    assert (name, cases, faults) == ("all", "130", "0")
-    assert int(refused) > 20
-    assert int(accepted) > 20
+    assert (name, cases, faults) == ("all", "260", "0")
+    assert int(refused) > 40
+    assert int(accepted) > 40
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_no_node_falls_of_hostile_messages(tmp_path: Path) -> None:
-    done = fuzz(tmp_path, "--what", "messages", "--cases", "200", "--seed", "7")
+    done = fuzz(tmp_path, "--what", "messages", "--cases", "100", "--seed", "7")
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-def test_a_minute_of_soak_ends_with_its_tables() -> None:
-    command = [sys.executable, "-m", "kmn_skill", "soak", "--hours", "0.02"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "frames lost" in done.stdout
-    assert all(f"\n{node} " in done.stdout for node in ("sim_node", "morph_node", "skill_node"))

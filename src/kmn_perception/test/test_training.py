@@ -29,21 +29,26 @@ def run(out: Path, *more: str) -> subprocess.CompletedProcess:
     )
 
 
-def test_training_learns_and_documents_itself(tmp_path: Path) -> None:
-    out = tmp_path / "w.safetensors"
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the weights of a run that nothing disturbed."""
+    out = tmp_path_factory.mktemp("whole") / "w.safetensors"
     result = run(out)
     assert result.returncode == 0, result.stderr
-    loaded = weights.load(out, KinematicModel.load("box_a"))
+    return out
+
+
+def test_training_learns_and_documents_itself(trained: Path) -> None:
+    loaded = weights.load(trained, KinematicModel.load("box_a"))
     by_step = loaded.metadata["errors"]["by_round_and_step"]
     assert by_step[-1][-1] < 0.1 * by_step[-1][0]
     assert loaded.metadata["training"]["samples"] == 300
     assert loaded.metadata["camera"]["width"] == 640
-    assert list((tmp_path / "w.run" / "curves").iterdir())
+    assert list((trained.with_suffix(".run") / "curves").iterdir())
 
 
-def test_an_interrupted_run_resumes_to_the_same_weights(tmp_path: Path) -> None:
-    whole, resumed = tmp_path / "whole.safetensors", tmp_path / "resumed.safetensors"
-    assert run(whole).returncode == 0
+def test_an_interrupted_run_resumes_to_the_same_weights(trained: Path, tmp_path: Path) -> None:
+    resumed = tmp_path / "resumed.safetensors"
     with subprocess.Popen(
         [*COMMAND, "--out", str(resumed), *SMALL], stderr=subprocess.PIPE, text=True
     ) as process:
@@ -57,14 +62,12 @@ def test_an_interrupted_run_resumes_to_the_same_weights(tmp_path: Path) -> None:
     again = run(resumed)
     assert again.returncode == 0
     assert "resuming in round 0" in again.stdout + again.stderr
-    for name, tensor in load_file(str(whole)).items():
+    for name, tensor in load_file(str(trained)).items():
         np.testing.assert_array_equal(tensor.numpy(), load_file(str(resumed))[name].numpy())
 
 
-def test_a_run_with_other_settings_is_not_continued(tmp_path: Path) -> None:
-    out = tmp_path / "w.safetensors"
-    assert run(out).returncode == 0
-    other = run(out, "--seed", "99")
+def test_a_run_with_other_settings_is_not_continued(trained: Path) -> None:
+    other = run(trained, "--seed", "99")
     assert other.returncode != 0
     assert "holds a run with other settings" in other.stderr
     assert "Traceback" not in other.stderr

@@ -58,8 +58,8 @@ class Blocks:
         v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
         rays = camera.rays(*np.meshgrid(u, v))
         allowed = settings.max_spread * noise
-        ramps = _SPANNED * np.stack([_ramp(inverse), _ramp(inverse.T).T])
-        allowed += np.where(ramps > _STEEP * allowed, ramps, 0.0).sum(axis=0)
+        ramp = _SPANNED * _ramp(inverse)  # of walls; what is steep along columns is mostly floor
+        allowed = allowed + np.where(ramp > _STEEP * allowed, ramp, 0.0)
         return cls(rays, inverse, (inverse > 0.0) & (spread < allowed), size)
 
     def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:

@@ -87,13 +87,24 @@ class World:
             seen = DoorObservation(self.time, "door", "world", NAMES, DOOR, covariance, "")
             self.door.add(seen)
 
-    def look_around(self, looks: int) -> tuple[bool, Looking]:
-        """Look until there is nothing to be seen better; tell whether the door is relied on."""
+    def looking(self, looks: int, patience: float) -> Looking:
+        """Return the looks of a goal."""
         made: Any = Looking
-        settings = replace(SETTINGS.opening, look_distance=1.4, look_nearer=0.75, looks=looks)
+        settings = replace(
+            SETTINGS.opening,
+            look_distance=1.4,
+            look_nearer=0.75,
+            looks=looks,
+            look_patience=patience,
+        )
         knowledge = type("Knowledge", (), {"model": MODEL, "door": self.door})
         knowledge.memory = DoorMemory()  # type: ignore[attr-defined]
         looking: Looking = made(knowledge, self, self, self, settings)
+        return looking
+
+    def look_around(self, looks: int) -> tuple[bool, Looking]:
+        """Look until there is nothing to be seen better; tell whether the door is relied on."""
+        looking = self.looking(looks, 0.0)
         state: Any = self.state()
         self.see()
         while looking.move_to_see(state):
@@ -147,3 +158,18 @@ def test_from_where_it_was_already_seen_it_does_not_look_again() -> None:
     world.see()
     assert looking.move_to_see(state)
     assert world.places[-2:] == pytest.approx([1.4, 1.05])
+
+
+def test_it_looks_for_a_while_before_it_looks_from_nearer() -> None:
+    """The first frames from a new place may differ, or know little, as those that follow do not."""
+    world = World(0.0, behind=0.2)
+    looking = world.looking(3, patience=3.0)
+    state: Any = world.state()
+    world.see()
+    assert looking.move_to_see(state)  # seen from afar: at once
+    world.see()
+    assert not looking.move_to_see(state)
+    world.time += 3.0
+    world.see()
+    assert looking.move_to_see(state)
+    assert world.places == pytest.approx([1.4, 1.05])

@@ -57,9 +57,9 @@ class Blocks:
         u = np.arange(inverse.shape[1]) * size + (size - 1) / 2.0
         v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
         rays = camera.rays(*np.meshgrid(u, v))
-        allowed = settings.max_spread * noise
+        least_allowed = settings.max_spread * noise
         ramp = _SPANNED * _ramp(inverse)  # of walls; what is steep along columns is mostly floor
-        allowed = allowed + np.where(ramp > _STEEP * allowed, ramp, 0.0)
+        allowed = least_allowed + np.where(ramp > _STEEP * least_allowed, ramp, 0.0)
         return cls(rays, inverse, (inverse > 0.0) & (spread < allowed), size)
 
     def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:

@@ -45,6 +45,7 @@ class Looking:
         self._drew_back = False
         self._looked: list[float] = []  # metres from the door
         self._no_nearer = ""  # why it does not look from nearer
+        self._since = 0.0  # when it came to where it looks from, seconds
 
     @property
     def carries_camera(self) -> bool:
@@ -72,7 +73,7 @@ class Looking:
                 self._drive(self._way(roughly, self._before(roughly, self._view_distance)))
                 return True
         doubt = self._doubt(now)
-        if doubt is None or not self._may_look_nearer:
+        if doubt is None or not self._may_look_nearer or self._may_still_learn(now):
             return False
         values, why = doubt
         settings, count = self._settings, len(self._looked)
@@ -118,6 +119,10 @@ class Looking:
         in_reach = self.carries_camera and not self._no_nearer
         return in_reach and len(self._looked) < self._settings.looks
 
+    def _may_still_learn(self, now: float) -> bool:
+        """Tell whether it has only just begun to look: with more frames a door is known better."""
+        return bool(self._looked) and now < self._since + self._settings.look_patience
+
     def _doubt(self, now: float) -> tuple[NDArray[np.float64], str] | None:
         """Return parameters (n + m,) of a door that is to be seen from nearer, and why."""
         unseen = self._door.without_handle(now)
@@ -155,4 +160,5 @@ class Looking:
 
     def _drive(self, way: Plan) -> None:
         self._robot.follow(way)
-        self._door.forget(self._commands.now())  # what it hid on the way
+        self._since = self._commands.now()
+        self._door.forget(self._since)  # what it hid on the way

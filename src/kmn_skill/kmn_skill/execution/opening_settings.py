@@ -19,6 +19,8 @@ class OpeningSettings:
     looks, look_nearer
         From how many places it looks at most before each grasp, and at which part of the distance
         of the one before each further one is.
+    look_patience
+        Seconds for which it looks from a place before it looks from a nearer one.
     look_first
         Whether it looks from there before each grasp.
     memory_age
@@ -45,6 +47,7 @@ class OpeningSettings:
     look_distance: float
     looks: int
     look_nearer: float
+    look_patience: float
     look_first: bool
     retreat_distance: float
     memory_age: float

@@ -137,7 +137,7 @@ def test_a_handle_that_is_known_well_enough_from_nowhere_is_not_grasped(
 ) -> None:
     perception.is_sure_within = 0.0
     system.start_anew()
-    assert system.set(looks=2, door_timeout=1.0).successful
+    assert system.set(looks=2, look_patience=0.2, door_timeout=1.0).successful
     reason = system.fail()
     assert "the standard deviation of the handle is 0.0" in reason
     assert "looked from 1.10, 0.94 m before it" in reason

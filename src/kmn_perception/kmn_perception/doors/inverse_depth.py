@@ -15,8 +15,6 @@ from kmn_perception.doors.search_settings import PlaneSettings
 from kmn_perception.model.camera import Camera
 
 _SPANNED = 0.8  # of a ramp, from the 10th to the 90th percentile
-_SLANTED = 2  # blocks to either side over which a slanted surface goes on
-_STEEP = 0.5  # of the spread that is allowed; what is less steep may be an edge that is smeared
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +56,9 @@ class Blocks:
         v = np.arange(inverse.shape[0]) * size + (size - 1) / 2.0
         rays = camera.rays(*np.meshgrid(u, v))
         least_allowed = settings.max_spread * noise
-        ramp = _SPANNED * _ramp(inverse)  # of walls; what is steep along columns is mostly floor
-        allowed = least_allowed + np.where(ramp > _STEEP * least_allowed, ramp, 0.0)
+        # Along rows, as walls are: what is steep along columns is mostly floor.
+        ramp = _SPANNED * _ramp(inverse, settings.slanted)
+        allowed = least_allowed + np.where(ramp > settings.steep * least_allowed, ramp, 0.0)
         return cls(rays, inverse, (inverse > 0.0) & (spread < allowed), size)
 
     def flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -88,15 +87,15 @@ def _medians(
     return np.where(enough, inverse(count // 2), 0.0), np.where(enough, spread, 0.0)
 
 
-def _ramp(inverse: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ramp(inverse: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
     """Return by how much a slanted surface changes over each block (H, W), along its row, 1/m.
 
-    The least of the changes between the blocks about it if all have one sign, else 0 (minmod): an
-    edge is steep between one or two of them only.
+    The least of the changes between the blocks up to a reach to either side if all have one sign,
+    else 0 (minmod): an edge is steep between one or two of them only.
     """
     change = np.diff(inverse, axis=1)
     change[(inverse[:, 1:] == 0.0) | (inverse[:, :-1] == 0.0)] = 0.0
-    change = np.pad(change, ((0, 0), (_SLANTED, _SLANTED)))
-    about = np.lib.stride_tricks.sliding_window_view(change, 2 * _SLANTED, axis=1)
+    change = np.pad(change, ((0, 0), (reach, reach)))
+    about = np.lib.stride_tricks.sliding_window_view(change, 2 * reach, axis=1)
     least: NDArray[np.float64] = np.maximum(about.min(axis=2), -about.max(axis=2))
     return np.maximum(least, 0.0)

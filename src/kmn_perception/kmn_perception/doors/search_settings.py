@@ -23,6 +23,10 @@ class PlaneSettings:
         Side of a block, pixels.
     min_measured, max_spread
         Share of a block that must be measured, and its largest spread in pixel noises.
+    slanted, steep
+        More of it is taken for the slant of a wall that goes on over so many blocks to either side,
+        where the slant alone is more than this share of that spread: what is less steep may be an
+        edge that the sensor smears.
     trials, patch
         Hypotheses for each plane, from three blocks within so many pixels of each other.
     inlier
@@ -34,6 +38,8 @@ class PlaneSettings:
     block: Count
     min_measured: Fraction
     max_spread: Positive
+    slanted: Count
+    steep: Fraction
     trials: Count
     patch: Interval
     inlier: Positive

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("pybullet")
 
 
-@pytest.mark.parametrize("model", ["box_a", "door"])
+@pytest.mark.parametrize("model", [pytest.param("box_a", marks=pytest.mark.slow), "door"])
 def test_simulated_scenes_are_seen_as_they_stand(model: str, domain: int) -> None:
     """Boxes creep, by micrometres in a second: their scene is answered all the same."""
     command = [sys.executable, "-m", "kmn_sim", "check_perception"]

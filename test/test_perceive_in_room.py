@@ -25,6 +25,7 @@ from kmn_skill.experiments.settings import Experiment, random_recesses  # noqa: 
 EXPERIMENT = Experiment.load()
 MODEL = EXPERIMENT.kinematic_model(in_room=True)
 GRASP = 0.02  # metres that the gripper forgives
+VERTICAL = 1.5e-3  # radians, by which a handle at 2 m is 3 mm too high or too low
 
 
 def perceive(
@@ -78,3 +79,12 @@ def test_the_handle_and_the_edges_are_where_they_stand(direction: str, seed: int
     front, half = panel.centre(gamma)[0] - panel.size(gamma)[0] / 2.0, panel.size(gamma)[1] / 2.0
     for corner, y in zip(found.corners[2:], (half, -half), strict=True):  # on the floor
         np.testing.assert_allclose(corner, (to_camera @ [front, y, 0.0, 1.0])[:3], atol=GRASP)
+
+
+@pytest.mark.parametrize("seed", [1, 5, 8])
+def test_the_vertical_is_seen_as_it_is(seed: int) -> None:
+    """By lines of the image, which have no steps as those of a renderer that samples pixels."""
+    values = EXPERIMENT.random_objects(MODEL, True, 1, seed)[0]
+    found = perceive(values, "pull", seed)
+    up, seen = MODEL.camera.pose[2, :3], found.camera_pose[2, :3]
+    assert np.arccos(up @ seen / np.linalg.norm(up) / np.linalg.norm(seen)) < VERTICAL

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from kmn_perception.configuration.resources import share_directory
 from kmn_perception.experiments.baselines import BASELINES
+from kmn_perception.experiments.evaluate_frames import main
 from kmn_perception.experiments.labelled_frame import FrameError, check_frames, read_frames
 from kmn_perception.experiments.settings import ExperimentSettings
 from kmn_perception.experiments.upright_box import UprightBox, errors, intersection_over_union
@@ -37,20 +38,40 @@ def _copy(folder: Path, *numbers: int) -> Path:
     return folder
 
 
-def _evaluate(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "kmn_perception", "evaluate_frames", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-    )
+class Ended(NamedTuple):
+    """How the program ended, and what it said."""
+
+    code: Any
+    stdout: str
+    stderr: str
+
+
+Evaluate = Callable[..., Ended]
+
+
+@pytest.fixture
+def evaluate(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Evaluate:
+    """Return what runs the program with some arguments, in this process."""
+
+    def run(*arguments: str | Path) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["evaluate_frames", *map(str, arguments)])
+        try:
+            code: Any = main()
+        except SystemExit as ended:
+            code = ended.code
+        return Ended(code, *capsys.readouterr())
+
+    return run
 
 
 @pytest.mark.slow
-def test_it_writes_statistics_and_pictures_with_the_baselines_beside(tmp_path: Path) -> None:
+def test_it_writes_statistics_and_pictures_with_the_baselines_beside(
+    evaluate: Evaluate, tmp_path: Path
+) -> None:
     frames, out = tmp_path / "frames", tmp_path / "pictures"
     frames.mkdir()
-    done = _evaluate(_copy(frames, 2, 14), "--json", tmp_path / "e.json", "--out", out)
-    assert done.returncode == 0, done.stderr
+    done = evaluate(_copy(frames, 2, 14), "--json", tmp_path / "e.json", "--out", out)
+    assert done.code == 0, done.stderr
     result = json.loads((tmp_path / "e.json").read_text())
     assert [key for key in result if key in KEYS] == [*KEYS]
     assert (result["frames"], result["objects"], result["less_visible"]["objects"]) == (2, 4, 1)
@@ -71,7 +92,7 @@ def test_it_writes_statistics_and_pictures_with_the_baselines_beside(tmp_path: P
 
 @pytest.mark.slow
 def test_a_frame_without_a_table_in_the_depth_counts_its_objects_as_not_found(
-    tmp_path: Path,
+    evaluate: Evaluate, tmp_path: Path
 ) -> None:
     _copy(tmp_path, 0)
     depth = cv2.imread(str(tmp_path / "learn0_d.png"), cv2.IMREAD_UNCHANGED)
@@ -83,15 +104,18 @@ def test_a_frame_without_a_table_in_the_depth_counts_its_objects_as_not_found(
     emptied = np.where(labels == 1, 0, depth)
     emptied[tuple(kept.T)] = depth[tuple(kept.T)]  # enough for the reference alone
     cv2.imwrite(str(tmp_path / "learn0_d.png"), emptied)
-    done = _evaluate(tmp_path, "--json", tmp_path / "e.json")
-    assert done.returncode == 0, done.stderr
+    done = evaluate(tmp_path, "--json", tmp_path / "e.json")
+    assert done.code == 0, done.stderr
     result = json.loads((tmp_path / "e.json").read_text())
     assert (result["objects"], result["found"], result["false_found"]) == (1, 0, 0)
     assert result["yaw_error_deg"] == {"median": None, "p95": None}
 
 
 def test_bad_folders_are_answered_with_what_was_expected(tmp_path: Path) -> None:
-    assert "holds no file *_d.png" in _evaluate(tmp_path).stderr
+    command = [sys.executable, "-m", "kmn_perception", "evaluate_frames", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "holds no file *_d.png" in done.stderr
     _copy(tmp_path, 3)
     (tmp_path / "learn3_l.png").unlink()
     with pytest.raises(FrameError, match="learn3_l.png is missing"):
@@ -116,7 +140,7 @@ def _change(folder: Path, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Non
 
 
 @pytest.mark.parametrize("shape", ["coarser", "finer", "cropped"])
-def test_frames_of_any_size_are_evaluated(tmp_path: Path, shape: str) -> None:
+def test_frames_of_any_size_are_evaluated(evaluate: Evaluate, tmp_path: Path, shape: str) -> None:
     """A crop is of another shape than the camera's image, so that it needs a camera of its own."""
     _copy(tmp_path, 3)
     if shape == "cropped":
@@ -133,17 +157,19 @@ def test_frames_of_any_size_are_evaluated(tmp_path: Path, shape: str) -> None:
         _change(tmp_path, lambda picture: picture[::2, ::2])
     else:
         _change(tmp_path, lambda picture: picture.repeat(2, axis=0).repeat(2, axis=1))
-    done = _evaluate(tmp_path, "--json", tmp_path / "e.json", "--out", tmp_path / "pictures")
-    assert done.returncode == 0, done.stderr
+    done = evaluate(tmp_path, "--json", tmp_path / "e.json", "--out", tmp_path / "pictures")
+    assert done.code == 0, done.stderr
     result = json.loads((tmp_path / "e.json").read_text())
     assert (result["objects"], result["found"], result["false_found"]) == (2, 2, 0)
     assert result["size_error_m"]["median"] < 0.006
 
 
-def test_frames_of_another_shape_without_a_camera_are_refused_with_both(tmp_path: Path) -> None:
+def test_frames_of_another_shape_without_a_camera_are_refused_with_both(
+    evaluate: Evaluate, tmp_path: Path
+) -> None:
     _change(_copy(tmp_path, 3), lambda picture: picture[:-30])
-    done = _evaluate(tmp_path)
-    assert done.returncode == 1
+    done = evaluate(tmp_path)
+    assert done.code == 1
     expected = "evaluate_frames: learn3: 640 x 450 pixels, expected the shape of 640 x 480, as"
     assert done.stderr.splitlines()[-1].startswith(expected)
     assert "camera.yaml" in done.stderr
@@ -157,9 +183,11 @@ def test_frames_of_another_shape_without_a_camera_are_refused_with_both(tmp_path
         ("--out", str(SHIPPED / "learn3_d.png"), "argument --out: .*is a file"),
     ],
 )
-def test_what_cannot_be_written_is_refused_at_once(option: str, path: str, message: str) -> None:
-    done = _evaluate(option, path)
-    assert done.returncode == 2
+def test_what_cannot_be_written_is_refused_at_once(
+    evaluate: Evaluate, option: str, path: str, message: str
+) -> None:
+    done = evaluate(option, path)
+    assert done.code == 2
     assert re.search(message, done.stderr)
 
 

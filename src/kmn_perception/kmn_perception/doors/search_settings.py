@@ -60,7 +60,7 @@ class VerticalSettings:
         Standard deviations of what a floor, a wall, the image's upward direction and a camera's
         pose tell, radians: a camera may hang askew on its mount.
     min_segment, segment_noise
-        Shortest line segment, and standard deviation of its ends, pixels.
+        Shortest line segment, and standard deviation of the ends of such a one, pixels.
     search, accept
         Angles about the first guess, and about the result, within which segments are vertical,
         radians.

@@ -68,7 +68,9 @@ def line_segments(
     ends, length = ends[length >= settings.min_segment], length[length >= settings.min_segment]
     normals = np.cross(camera.rays(ends[:, 0], ends[:, 1]), camera.rays(ends[:, 2], ends[:, 3]))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals, dtype=np.float64), settings.segment_noise / length
+    # A line is fitted to as many pixels as it is long: its direction is known by length^-1.5.
+    deviations = settings.segment_noise / length * np.sqrt(settings.min_segment / length)
+    return np.asarray(normals, dtype=np.float64), deviations
 
 
 def find_up(

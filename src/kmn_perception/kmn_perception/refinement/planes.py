@@ -163,8 +163,8 @@ def plane_terms(view: ModelView, image: InverseDepthImage, sampling: PlaneSampli
             inflation = max(1.0, rows / number, columns / number)
             inflation += sampling.shape_error**2 * side_information[body]
             jacobian = view.side_jacobians[body]
-            hessian += jacobian.T @ (side_moments[body] / inflation) @ jacobian
-            total += jacobian.T @ (side_forces[body] / inflation)
+            moment, force = side_moments[body] / inflation, side_forces[body] / inflation
+            add_normal_equations(hessian, total, jacobian, moment, force)
     return PlaneTerms(hessian, total, residuals[:count])
 
 

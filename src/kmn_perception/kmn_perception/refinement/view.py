@@ -270,10 +270,13 @@ def add_normal_equations(
     moment: NDArray[np.float64],
     force: NDArray[np.float64],
 ) -> None:
-    """Add a plane or a line with a Jacobian (3, P), given its own moment (3, 3) and force (3,)."""
+    """Add a plane, a line or a side with a Jacobian (K, P), given its moment (K, K) and force (K,).
+
+    In loops: to compile products of matrices numba needs SciPy, which nodes do not have.
+    """
     for i in range(jacobian.shape[1]):
-        for k in range(3):
+        for k in range(jacobian.shape[0]):
             gradient[i] += jacobian[k, i] * force[k]
-            for c in range(3):
+            for c in range(jacobian.shape[0]):
                 for j in range(jacobian.shape[1]):
                     hessian[i, j] += jacobian[k, i] * moment[k, c] * jacobian[c, j]

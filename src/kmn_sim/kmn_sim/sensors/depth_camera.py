@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -59,7 +60,10 @@ class DepthCamera:
         depth = picture.depth
         if self._sensor is not None:
             depth = self._sensor.measure(depth, self._camera.fx)
-        return picture._replace(depth=depth * np.float32(self._scale))
+        # A renderer's edges have steps, whose pieces line detectors take for lines of their own.
+        blur = simulation.settings.physics.blur
+        colour = cv2.GaussianBlur(picture.colour, (0, 0), blur).astype(np.uint8, copy=False)
+        return Picture(colour, depth * np.float32(self._scale))
 
 
 def mount_error(offset: float, tilt: float, seed: int) -> NDArray[np.float64]:

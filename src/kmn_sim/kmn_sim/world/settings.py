@@ -28,13 +28,24 @@ class LightSettings(NamedTuple):
 
 
 class PhysicsSettings(NamedTuple):
-    """Steps a second, iterations of the solver in each, gravity in m/s^2, floor and light."""
+    """Numbers of the physics, and of how it is seen.
+
+    Attributes
+    ----------
+    rate, solver_iterations
+        Steps a second, and iterations of the solver in each.
+    gravity
+        In m/s^2.
+    blur
+        Standard deviation by which a camera blurs its image, pixels.
+    """
 
     rate: Annotated[int, Field(ge=60, le=10_000)]
     solver_iterations: Annotated[int, Field(ge=1, le=10_000)]
     gravity: NonNegative
     floor: FloorSettings
     light: LightSettings
+    blur: Positive
 
 
 class FrameSettings(NamedTuple):

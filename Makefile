@@ -10,6 +10,7 @@ SHELL := /bin/bash
 ROS := $(if $(filter jazzy,$(ROS_DISTRO)),system,$(or $(shell cat .venv/ros 2>/dev/null),wheels))
 PYTHON_PACKAGES := kmn_perception kmn_sim kmn_skill
 INTERFACE_PACKAGES := control_msgs tf2_msgs vision_msgs
+USES := training evaluation simulation viewer browser cluster docs test
 
 READY := .venv/.ready-
 INTERFACES := install/.built-interfaces
@@ -20,7 +21,7 @@ MSGS_SOURCES := $(shell find src/kmn_msgs -type f -not -path '*/test/*')
 PYTHON_SOURCES := colcon.meta $(shell find -L $(PYTHON_PACKAGES:%=src/%) \
     -not -path '*/test/*' -not -name test -not -name '__pycache__' -not -name '*.pyc' -not -name '*.nb[ic]' \
     -not -path '*.egg-info*')
-TESTS := $(wildcard src/*/test) test
+TESTS := test $(wildcard src/*/test)
 
 .PHONY: help
 help:  ## list the targets
@@ -34,11 +35,12 @@ MODE := pull
 CONTROL := topic
 ROBOT :=
 OBJECT :=
+BESIDE :=
 VIEW :=
 
 .PHONY: demo
-demo: build $(READY)simulation $(if $(VIEW),$(READY)viewer)  ## let a simulated robot open a door in its wall, as it sees it, or a drawer (SEED=0 MODE=pull CONTROL=topic ROBOT=NAME OBJECT=NAME VIEW=1)
-	@./run kmn_skill demo $(if $(OBJECT),--object $(OBJECT),--room) --seed $(SEED) --mode $(MODE) --control $(CONTROL) $(ROBOT:%=--robot %) $(if $(VIEW),--view)
+demo: build $(READY)simulation $(if $(VIEW),$(READY)viewer)  ## let a simulated robot open a door in its wall, as it sees it, or a drawer (SEED=0 MODE=pull CONTROL=topic ROBOT=NAME OBJECT=NAME BESIDE=NAME VIEW=1)
+	@./run kmn_skill demo $(if $(OBJECT),--object $(OBJECT),--room) --seed $(SEED) --mode $(MODE) --control $(CONTROL) $(BESIDE:%=--beside %) $(ROBOT:%=--robot %) $(if $(VIEW),--view)
 
 .PHONY: demo-bag
 demo-bag: build  ## replay the bag of real Kinect frames into morph_node: all boxes, with pictures
@@ -59,24 +61,30 @@ fuzz: build $(READY)training $(READY)simulation $(READY)viewer  ## hostile files
 soak: build $(READY)simulation $(READY)viewer  ## open doors while nodes die, floods come, clocks jump and disks are full (HOURS=8 SEED=0)
 	@./run kmn_skill soak --hours $(HOURS) --seed $(SEED)
 
-# Tests of one file run one after the other, files side by side; each with one thread of its own.
+# Tests of one file run one after the other, files side by side, as many as there are cores, each with
+# one thread of its own; with more of them plans run into their time limits. The long ones are first.
 # They import what is installed, as the programs that they start: numba compiles each path anew.
 .PHONY: test test-all
 test: SELECTED := -m "not slow"
 test: test-all  ## run the style checks and all tests but the slow ones (under 20 minutes on 2 cores)
-test-all: build compiling lint $(READY)simulation $(READY)browser $(READY)cluster $(READY)docs  ## run the style checks and all tests
+test-all: checked  ## run the style checks and all tests
 	@echo "==> Testing"
 	@. tools/environment.sh $(ROS) && . install/setup.bash && OMP_NUM_THREADS=1 .venv/bin/python -m pytest \
-	    --numprocesses=auto --dist=loadfile --durations=30 --override-ini=pythonpath=test $(SELECTED) $(TESTS)
+	    --numprocesses=auto --dist=loadfile --no-loadscope-reorder --durations=30 \
+	    --override-ini=pythonpath=test $(SELECTED) $(TESTS)
 
-# While one core checks the style, another compiles what most tests need, once for all of them.
-.PHONY: compiling
-compiling: build $(READY)evaluation
-	@{ . tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m kmn_perception evaluate \
-	    --model box --samples 1; } >/dev/null 2>&1 &
+# While one core installs packages and checks the style, another builds, and compiles what most tests
+# need, once for all of them.
+.PHONY: checked compiled
+checked: $(READY)nodes
+	@$(MAKE) --jobs=2 --no-print-directory lint compiled
+
+compiled: build
+	@. tools/environment.sh $(ROS) && . install/setup.bash && .venv/bin/python -m kmn_perception benchmark \
+	    --frames 1 >/dev/null 2>&1 || true  # the tests tell what is wrong
 
 .PHONY: lint
-lint: $(READY)test $(READY)training $(READY)evaluation $(READY)viewer $(READY)docs  ## check style (ruff) and types (mypy)
+lint: $(READY)all  ## check style (ruff) and types (mypy)
 	@echo "==> Checking style and types"
 	@.venv/bin/ruff check --quiet .
 	@.venv/bin/ruff format --quiet --check .
@@ -120,19 +128,24 @@ $(READY)nodes: mode
 endif
 
 $(READY)nodes: requirements.txt requirements-ros.txt constraints.txt torch-cpu.txt tools/setup.sh
-	@tools/setup.sh nodes $(ROS)
+	@tools/setup.sh $(ROS) nodes
 	@touch $@
 
 $(READY)%: requirements-%.txt $(READY)nodes
-	@tools/setup.sh $* $(ROS)
+	@tools/setup.sh $(ROS) $*
 	@touch $@
+
+$(READY)all: $(USES:%=requirements-%.txt) $(READY)nodes
+	@tools/setup.sh $(ROS) $(USES)
+	@touch $(USES:%=$(READY)%) $@
 
 $(INTERFACES): $(INTERFACE_SOURCES) tools/build.sh $(READY)nodes
 	@echo; echo "==> Building the interfaces that ROS lacks (1 minute)"
 	@tools/build.sh $(ROS) --missing $(INTERFACE_PACKAGES)
 	@mkdir -p install && touch $@
 
-$(MSGS): $(MSGS_SOURCES) tools/build.sh $(READY)nodes
+# After the interfaces: one colcon at a time.
+$(MSGS): $(MSGS_SOURCES) tools/build.sh $(READY)nodes | $(INTERFACES)
 	@echo; echo "==> Building kmn_msgs (30 seconds)"
 	@tools/build.sh $(ROS) kmn_msgs
 	@touch $@

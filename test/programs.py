@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+import pytest
+
 TIMEOUT = 120.0  # seconds
 GREETING = "pybullet build time"  # which pybullet prints when it is imported
+# How a program is ended, by a terminal and by others; the same code answers both.
+INTERRUPTS = (signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow))
 # Texts of parameter files that are refused; None: there is no file.
 BROKEN_FILES = (None, "/**:\n  ros__parameters: {model: [1, door]}\n")
 

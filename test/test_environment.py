@@ -46,10 +46,7 @@ def test_another_ros_that_is_sourced_stays_outside(tmp_path: Path) -> None:
     "command",
     [
         "./run kmn_perception replay",
-        "make --silent --old-file=build --old-file=compiling --old-file=lint "
-        "--old-file=.venv/.ready-simulation "
-        "--old-file=.venv/.ready-browser --old-file=.venv/.ready-cluster "
-        "--old-file=.venv/.ready-docs test",
+        "make --silent --old-file=checked test",
     ],
 )
 def test_programs_and_tests_start_without_another_ros(command: str, tmp_path: Path) -> None:
@@ -81,7 +78,7 @@ def test_a_checkout_where_cmake_would_fail_is_refused_at_once(name: str, tmp_pat
     tools = tmp_path / name / "tools"
     tools.mkdir(parents=True)
     shutil.copy(ROOT / "tools/setup.sh", tools)
-    ended = bash("tools/setup.sh nodes wheels", tools.parent)
+    ended = bash("tools/setup.sh wheels nodes", tools.parent)
     assert ended.returncode == 1
     assert ended.stderr.startswith("set-up: the path of this checkout must consist of")
     assert str(tools.parent) in ended.stderr

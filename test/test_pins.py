@@ -66,7 +66,7 @@ def test_the_set_up_refuses_a_file_of_another_hash(hashed: str, tmp_path: Path) 
     (tmp_path / "constraints.txt").write_text(f"tiny==1.0{digest.get(hashed, '')}\n")
     (tmp_path / "requirements-tiny.txt").write_text("tiny\n")
     ended = subprocess.run(
-        ["tools/setup.sh", "tiny", "wheels"],
+        ["tools/setup.sh", "wheels", "tiny"],
         cwd=tmp_path,
         env={
             **os.environ,

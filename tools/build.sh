@@ -21,6 +21,7 @@ fi
 export VIRTUAL_ENV=$venv PATH=$venv/bin:$PATH
 # colcon itself calls `setup.py install`, of which setuptools warns at every build.
 unset PYTHONDONTWRITEBYTECODE # compile once, at the build
+unset MAKEFLAGS # colcon chooses the number of jobs
 export PYTHONWARNINGS="ignore:setup.py install is deprecated,ignore:easy_install command is deprecated"
 
 # Whether ROS has a package; what this workspace built of it does not count.

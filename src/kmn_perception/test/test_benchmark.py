@@ -82,7 +82,7 @@ def test_the_result_holds_every_stage_and_the_transport(
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
     result = json.loads(out.read_text())
-    assert set(result) == {"stages", "callbacks", "transport"}
+    assert set(result) == {"stages", "callbacks", "latency", "transport"}
     assert tuple(result["callbacks"]) == CASES
     assert list(result["stages"]) == [
         "message_to_view", "background_removal", "splat", "network", "predictions",
@@ -97,7 +97,10 @@ def test_the_result_holds_every_stage_and_the_transport(
         assert transport["sent"] == FRAMES
         assert transport["received"] + transport["lost"] <= FRAMES
         assert sender == "foreign" or transport["received"] > 0
-    for row in (*result["stages"], *result["callbacks"], *result["transport"]):
+    ((case, latency),) = result["latency"].items()
+    assert 0 < latency["answered"] <= latency["sent"] == FRAMES
+    assert 0.0 < latency["median_ms"] <= latency["p95_ms"]
+    for row in (*result["stages"], *result["callbacks"], case, *result["transport"]):
         assert f"\n{row} " in ended.stdout
 
 
@@ -137,6 +140,7 @@ def test_parameters_that_cannot_be_measured_are_refused(
         rclpy.shutdown(context=context)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_both_processes_without_a_traceback(
     environment: dict[str, str], parameters: list[str]
 ) -> None:

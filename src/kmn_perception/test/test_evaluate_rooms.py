@@ -57,6 +57,13 @@ def test_all_methods_see_the_same_rooms(run: tuple[dict[str, Any], str]) -> None
         assert list(method["by"]) == ["recess", "distance", "view_angle", "handle", "state"]
         for parts in method["by"].values():
             assert sum(part["doors"] for part in parts.values()) == result["observable"]
+        found = sum(part["doors"] for part in method["by_stated"].values())
+        assert found <= result["observable"]
+        assert found == sum(
+            part["right"] + part["ok_and_wrong"] + part["not_seen_and_wrong"]
+            for part in method["by_stated"].values()
+        )
+        assert method["limit"]["far_off"] <= method["limit"]["doors"] <= result["samples"]
         rooms = {kind: part["rooms"] for kind, part in method["negatives"].items()}
         assert rooms == {kind: int(kind == NEGATIVES[0]) for kind in NEGATIVES}
 

@@ -178,6 +178,10 @@ def test_an_action_says_what_is_grasped_and_moved() -> None:
     (action,) = KinematicModel.load("drawer").actions
     assert [joint.name for joint in action.joints] == ["slide"]
     np.testing.assert_allclose(action.grasp.place(np.zeros(5)), [-0.075, 0.0, 0.7])
+    (action,) = KinematicModel.load("room_door").actions
+    usual, other = (action.grasp.place(np.zeros(4), number) for number in (0, 1))
+    np.testing.assert_allclose(usual, [-0.057, -0.29, 0.996])
+    np.testing.assert_allclose(other, [-0.057, -0.265, 0.996])
 
 
 SLIDE = {"type": "prismatic", "body": "front", "parent": "cabinet", "axis": [1, 0, 0]}

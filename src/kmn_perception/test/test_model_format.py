@@ -102,6 +102,7 @@ def test_schema_and_reader_want_the_same_keys(name: str, change: str, tmp_path: 
         lambda c: c["joints"]["slide"].update(origin=[0, 0, 0]),
         lambda c: c["joints"]["mount"].update(axis=[0, 0, 1]),
         lambda c: c["actions"]["open"]["grasp"].update(axis="up"),
+        lambda c: c["actions"]["open"]["grasp"].update(others=[0.0, 0.0, 0.1]),
         lambda c: c.update(start="anywhere"),
         lambda c: c.update(theta=[]),
         lambda c: c.update(bodies={}),

@@ -58,7 +58,7 @@ def excesses(estimate: Estimate, truth: np.ndarray, position: float) -> np.ndarr
     return np.abs(errors) / np.maximum(DEVIATIONS * deviations, PRECISION)
 
 
-@pytest.mark.parametrize("noise", ["none", "kinect"])
+@pytest.mark.parametrize("noise", [pytest.param("none", marks=pytest.mark.slow), "kinect"])
 @pytest.mark.parametrize(("name", "position"), STATES)
 def test_a_moved_joint_is_measured_or_the_estimate_is_not_ok(
     name: str, position: float, noise: str

@@ -19,7 +19,9 @@ from kmn_perception.training.procedures import load_training_settings
 from kmn_perception.training.samples import sample
 from kmn_perception.training.train import arguments, settings_of
 
-COMMAND = [sys.executable, "-m", "kmn_perception", "train", "--model", "box_a"]
+ARGUMENTS = ["kmn_perception", "train", "--model", "box_a"]
+COMMAND = [sys.executable, "-m", *ARGUMENTS]
+TRAIN = ["-m", "--", *ARGUMENTS]  # by torchrun, which takes --run for its own otherwise
 SMALL = ["--samples", "300", "--epochs", "10", "--retrain-epochs", "1", "--rounds", "1"]
 
 
@@ -73,11 +75,12 @@ def test_a_run_with_other_settings_is_not_continued(trained: Path) -> None:
     assert "Traceback" not in other.stderr
 
 
+@pytest.mark.slow
 def test_two_processes_train_together(tmp_path: Path) -> None:
     out = tmp_path / "w.safetensors"
     torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
     result = subprocess.run(
-        [*torchrun, "--nproc-per-node", "2", *COMMAND[1:], "--out", str(out), *SMALL],
+        [*torchrun, "--nproc-per-node", "2", *TRAIN, "--out", str(out), *SMALL],
         capture_output=True,
         text=True,
         check=False,
@@ -104,7 +107,7 @@ class Machines:
             port = free.getsockname()[1]
         torchrun = [sys.executable, "-m", "torch.distributed.run", "--nnodes=2"]
         torchrun += ["--master-addr=127.0.0.1", f"--master-port={port}"]
-        command = [*COMMAND[1:], "--out", str(self.out), *SMALL]
+        command = [*TRAIN, "--out", str(self.out), *SMALL]
         return [
             subprocess.Popen(
                 [*torchrun, f"--node-rank={rank}", *command, "--run", str(folder)],

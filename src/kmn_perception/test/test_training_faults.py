@@ -84,7 +84,10 @@ def _replace_by_another(folder: Path) -> None:
     np.save(folder / "data0" / "round0" / "values.npy", np.zeros((10, 2)))
 
 
-@pytest.mark.parametrize("damage", [_remove, _truncate, _replace_by_another])
+@pytest.mark.parametrize(
+    "damage",
+    [_remove, *(pytest.param(d, marks=pytest.mark.slow) for d in (_truncate, _replace_by_another))],
+)
 def test_a_run_without_its_data_is_not_resumed(
     resumable: Path, damage: Callable[[Path], None]
 ) -> None:

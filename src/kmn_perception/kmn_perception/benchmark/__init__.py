@@ -7,7 +7,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from kmn_perception.benchmark import callbacks, stages, transport
+from kmn_perception.benchmark import callbacks, latency, stages, transport
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.command_line.arguments import output_file, whole_number, write_json
 from kmn_perception.command_line.columns import columns
@@ -38,7 +38,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
 
 
 def benchmark(node: Node, frames: int) -> dict[str, Any]:
-    """Measure stages and transport with the parameters of morph_node, as written to JSON."""
+    """Measure all with the parameters of morph_node, as it is written to JSON."""
     settings = MorphNodeSettings.check(declare_parameters(node, "morph_node"))
     use_one_thread()
     estimator = MorphEstimator.load(settings.model, settings.weights, settings.estimator)
@@ -51,6 +51,7 @@ def benchmark(node: Node, frames: int) -> dict[str, Any]:
     return {
         "stages": stages.measure(chain, frames),
         "callbacks": callbacks.measure(frames),
+        "latency": {latency.CASE: latency.measure(node, frames)},
         "transport": {
             sender: transport.measure(node, settings, frames, sender)
             for sender in transport.SENDERS
@@ -72,11 +73,15 @@ def report(result: dict[str, Any]) -> str:
     callback_rows = [["callback", "median [ms of a core]", "p95 [ms of a core]"]]
     for name, times in result["callbacks"].items():
         callback_rows.append([name, f"{times['median_ms']:.1f}", f"{times['p95_ms']:.1f}"])
+    latency_rows = [["latency", "sent", "answered", "median [ms]", "p95 [ms]"]]
+    for name, found in result["latency"].items():
+        counts = (str(found[key]) for key in ("sent", "answered"))
+        latency_rows.append([name, *counts, f"{found['median_ms']:.1f}", f"{found['p95_ms']:.1f}"])
     transport_rows = [["transport", "sent", "received", "lost, by their numbers", "median [ms]"]]
     for sender, found in result["transport"].items():
         counts = (str(found[key]) for key in ("sent", "received", "lost"))
         transport_rows.append([sender, *counts, f"{found['median_ms']:.2f}"])
-    return "\n\n".join(map(columns, (stage_rows, callback_rows, transport_rows)))
+    return "\n\n".join(map(columns, (stage_rows, callback_rows, latency_rows, transport_rows)))
 
 
 def main() -> int:

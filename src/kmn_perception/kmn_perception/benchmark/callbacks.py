@@ -83,7 +83,7 @@ def _cases(repetitions: int) -> dict[str, Callable[[], list[float]]]:
     in_walls = {**parameter_values("morph_node"), **DOOR, "model": DoorSettings.load().model}
     doors = load_pipeline(MorphNodeSettings.check(in_walls))
     boxes = load_pipeline(MorphNodeSettings.check(parameter_values("morph_node", TABLETOP)))
-    small, large = (list(_door_frames(size)) for size in (None, LARGE))
+    small, large = (list(door_frames(size)) for size in (None, LARGE))
     on_table = [Seen(boxes_on_a_table(boxes.model), None, boxes.model.camera)]
     return {
         "door": lambda: _times(doors, small, repetitions, DoorTracker(1)),
@@ -93,7 +93,8 @@ def _cases(repetitions: int) -> dict[str, Callable[[], list[float]]]:
     }
 
 
-def _door_frames(size: tuple[int, int] | None) -> Iterator[Seen]:
+def door_frames(size: tuple[int, int] | None = None) -> Iterator[Seen]:
+    """Yield the exposures of a camera that rests before a door, of so many columns and rows."""
     camera = Camera.load("d455")
     for frame in make_sequence(ROOM, DISTINCT, camera=camera.resized(*size) if size else camera):
         yield Seen(frame.depth, frame.images.grey, frame.room.camera)

@@ -21,19 +21,19 @@ class Grasp:
 
     Attributes
     ----------
-    offset
-        From the body's centre, metres.
+    offsets
+        From the body's centre, metres: where it is taken, and then where else it can be.
     axis
         ``x``, ``y`` or ``z``, along which its two points lie on the body's surface.
     """
 
     body: Body
-    offset: tuple[float, ...]
+    offsets: tuple[tuple[float, ...], ...]
     axis: str
 
-    def place(self, gamma: ArrayLike) -> NDArray[np.float64]:
-        """Return the middle (3,) between its two points at gamma (m,), metres."""
-        return self.body.centre(gamma) + self.offset
+    def place(self, gamma: ArrayLike, number: int = 0) -> NDArray[np.float64]:
+        """Return the middle (3,) between its two points at gamma (m,), at an offset, metres."""
+        return self.body.centre(gamma) + self.offsets[number]
 
     def thickness(self, gamma: ArrayLike) -> float:
         """Return how far apart its two points are at gamma (m,), metres."""
@@ -131,8 +131,9 @@ def _motions(name: str, folder: Path) -> str:
 
 
 def _read_grasp(section: Section, bodies: Sequence[Body]) -> Grasp:
-    section.allow(("body", "axis"), ("offset",))
+    section.allow(("body", "axis"), ("offset", "others"))
     by_name = {body.name: body for body in bodies}
     offset = section.numbers("offset", 3) if "offset" in section else [0.0] * 3
+    others = section.table("others", 3) if "others" in section else []
     body = by_name[section.text("body", by_name)]
-    return Grasp(body, tuple(offset), section.text("axis", AXES))
+    return Grasp(body, tuple(map(tuple, [offset, *others])), section.text("axis", AXES))

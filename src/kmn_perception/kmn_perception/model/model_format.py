@@ -84,6 +84,9 @@ GRASP: Keys = {
     "axis": Key(_one_of(*AXES), "`x`, `y`, `z`", REQUIRED,
                 "From one fingertip to the other, on the body's surface."),
     "offset": Key(NUMBERS_3, "m", "`[0, 0, 0]`", "Of the grasp from the body's centre."),
+    "others": Key({"type": "array", "items": NUMBERS_3, "minItems": 1}, "list of m", "none",
+                  "Offsets where it takes hold if no motion is found with the first, as of a wide "
+                  "hand that would touch what is beside; tried in their order."),
 }  # fmt: skip
 UNLATCH: Keys = {
     "joint": Key(TEXT, "text", REQUIRED, "That is moved first."),

@@ -10,9 +10,10 @@ from typing import Any
 
 from kmn_perception.doors.door_estimate import DoorStatus
 from kmn_perception.evaluation.doors.error_statistics import ERRORS, coverage, error_sizes, times
+from kmn_perception.evaluation.doors.errors import EDGES, MM
 from kmn_perception.evaluation.doors.outcome import Outcome, Verdict
 from kmn_perception.evaluation.doors.room_comparison import RoomSample
-from kmn_perception.evaluation.doors.settings import RoomEvaluationSettings
+from kmn_perception.evaluation.doors.settings import DoorErrorSettings, RoomEvaluationSettings
 from kmn_perception.rooms.sampling import NEGATIVES
 
 Statistics = dict[str, Any]
@@ -25,7 +26,8 @@ def statistics(
 ) -> Statistics:
     """Return the statistics of all methods; errors are of all doors that are found.
 
-    ``limit`` holds the errors of who is told the edges of the same doors.
+    ``limit`` holds the errors of who is told the edges of the same doors, and how many of these
+    are ``far_off`` all the same.
     """
     doors = [sample for sample in samples if sample.traits is not None]
     return {
@@ -50,7 +52,12 @@ def _of_method(
         "wrong": _faults(name, doors),
         "refused": _reasons([sample.outcomes[name] for sample in seen], settings.reasons),
         **{key: error_sizes(off, key) for key in ERRORS},
-        "limit": {key: error_sizes(limits, key) for key in ERRORS},
+        "limit": {
+            **{key: error_sizes(limits, key) for key in ERRORS},
+            "doors": len(limits),
+            "far_off": sum(bool(errors.far_off(DoorErrorSettings.load())) for errors in limits),
+        },
+        "by_stated": _by_stated([sample.outcomes[name] for sample in seen], settings),
         "coverage95": coverage(off, settings.confidence),
         "milliseconds": times([sample.seconds[name] for sample in doors]),
         "by": {
@@ -114,6 +121,21 @@ def _reasons(outcomes: Sequence[Outcome], number: int) -> dict[str, int]:
     )
     # Of equally common ones the same are named, in whatever order they came.
     return dict(sorted(reasons.items(), key=lambda item: (-item[1], item[0]))[:number])
+
+
+def _by_stated(outcomes: Sequence[Outcome], settings: RoomEvaluationSettings) -> Statistics:
+    """Return the counts of doors that are found, by the deviation that is stated of their edges."""
+    stated = [
+        (outcome, outcome.errors.stated[EDGES].max() / MM)
+        for outcome in outcomes
+        if outcome.errors is not None
+    ]
+    return {
+        _title(1e3 * low, 1e3 * high, "mm"): counts(
+            [outcome for outcome, deviation in stated if low <= deviation < high]
+        )
+        for low, high in pairwise((0.0, *settings.bins.stated, float("inf")))
+    }
 
 
 def _breakdowns(

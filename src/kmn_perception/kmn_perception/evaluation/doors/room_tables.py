@@ -39,7 +39,11 @@ def room_report(result: dict[str, Any]) -> str:
         f"Of all {doors} doors\n{_counts(methods, 'of_all')}",
         "Errors of the doors that are found: median / 95th percentile, mm and degrees;\n"
         "limit: of the same doors, if their edges are told\n" + _errors(methods),
-        "What is wrong, of all doors that are found\n" + _faults(methods),
+        "What is wrong, of all doors that are found\n"
+        "limit: what is too far off of the same doors, if their edges are told\n"
+        + _faults(methods),
+        "By the larger deviation that is stated of the edges, of those in view that are found:\n"
+        "doors, right / OK, wrong / not seen, wrong\n" + _by_stated(methods),
         *(f"Refused by {name}, of those in view\n{_reasons(m)}" for name, m in methods.items()),
         *_breakdowns(methods),
         "Doors that are not there: OK / handle not seen, of rooms\n" + _negatives(methods),
@@ -76,6 +80,17 @@ def _faults(methods: dict[str, Any]) -> str:
     for name, method in methods.items():
         parts = (f"{fault} {count}" for fault, count in method["wrong"]["quantities"].items())
         rows.append([name, str(len(method["wrong"]["rooms"])), ", ".join(parts) or NONE])
+        limit = method["limit"]
+        rows.append(["limit", str(limit["far_off"]), f"of {limit['doors']}"])
+    return columns(rows)
+
+
+def _by_stated(methods: dict[str, Any]) -> str:
+    first = next(iter(methods.values()))["by_stated"]
+    rows = [["stated", *methods]]
+    for part in first:
+        counts = [method["by_stated"][part] for method in methods.values()]
+        rows.append([part, *(f"{c['doors']}, {_triple(c)}" for c in counts)])
     return columns(rows)
 
 

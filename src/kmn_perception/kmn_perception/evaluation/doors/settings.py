@@ -61,12 +61,15 @@ class BinSettings:
         Of the panel's front from the wall's face, to either side, metres.
     distance
         From the camera to the panel's middle, metres.
+    stated
+        Standard deviation of an edge that an estimate states, the larger one of the two, metres.
     view_angle
         Between the panel's normal and the direction to the camera, degrees.
     """
 
     recess: Limits
     distance: Limits
+    stated: Limits
     view_angle: Limits
 
 

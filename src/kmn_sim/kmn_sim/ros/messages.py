@@ -16,15 +16,16 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from kmn_msgs.msg import MorphingParameters
+from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.stamps import seconds
 from kmn_sim.control.interpolation import State
 from kmn_sim.control.trajectory import Command, Waypoint
 from kmn_sim.control.trajectory_goal import Tolerances
 from kmn_sim.robot.description import BASE_FOOTPRINT
 from kmn_sim.robot.simulated_robot import SimulatedRobot
-from kmn_sim.world.scenario import Scenario
 from kmn_sim.world.simulation import Simulation
 
+FIRST_ID = 1  # of the object where others stand beside it
 ERASED = -1.0  # a tolerance that the controller shall not have
 ENCODINGS = ("rgb8", "mono8")  # of images
 
@@ -129,15 +130,40 @@ def odometry(robot: SimulatedRobot, header: Header) -> Odometry:
     return message
 
 
-def ground_truth(
-    scenario: Scenario, values: NDArray[np.float64], header: Header
+def beside_state(simulation: Simulation, header: Header) -> JointState:
+    """Make the message of the joints of the objects that stand beside; named MODEL_ID/JOINT."""
+    names, positions, velocities = list[str](), list[float](), list[float]()
+    for number, each in enumerate(simulation.beside):
+        model = simulation.scenario.beside[number].model.name
+        names += [f"{model}_{FIRST_ID + 1 + number}/{joint}" for joint in each.joint_names]
+        positions += each.positions().values()
+        velocities += each.velocities().values()
+    return joint_state(names, positions, velocities, (), header)
+
+
+def ground_truths(simulation: Simulation, header: Header) -> list[MorphingParameters]:
+    """Make the messages of the true parameters of all objects, of what is articulated when closed.
+
+    An object alone has the id 0; one with others beside it has 1, and these have the next ones.
+    """
+    scenario = simulation.scenario
+    if not scenario.beside:
+        return [_ground_truth(scenario.model, simulation.values(), 0, header)]
+    objects = (scenario, *scenario.beside)
+    return [
+        _ground_truth(each.model, each.values, number, header)
+        for number, each in enumerate(objects, FIRST_ID)
+    ]
+
+
+def _ground_truth(
+    model: KinematicModel, values: NDArray[np.float64], number: int, header: Header
 ) -> MorphingParameters:
-    """Make the message of the true morphing parameters (n + m,); the door's, when closed."""
-    model = scenario.model
     theta, gamma = model.split(values)
     return MorphingParameters(
         header=header,
         model=model.name,
+        id=number,
         theta_names=[parameter.name for parameter in model.theta],
         theta=theta.tolist(),
         gamma_names=[parameter.name for parameter in model.gamma],

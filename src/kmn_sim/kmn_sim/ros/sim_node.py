@@ -1,4 +1,4 @@
-"""The node of the simulated world: robot, door or box, and depth camera behind topics."""
+"""The node of the simulated world: robot, objects, and depth camera behind topics."""
 
 from __future__ import annotations
 
@@ -106,12 +106,14 @@ class SimNode(OverridableNode):
         super().destroy_node()
 
     def _connect(self) -> None:
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        count = 1 + len(self._settings.scenario.beside)
+        latched = QoSProfile(depth=count, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         if self._settings["publish_clock"]:  # /clock is one for all nodes
             self._clock_publisher = self.create_publisher(ClockMessage, "/clock", QUEUE_DEPTH)
         self._joint_publisher = self.create_publisher(JointState, "joint_states", QUEUE_DEPTH)
         self._odometry_publisher = self.create_publisher(Odometry, "odom", QUEUE_DEPTH)
         self._door_publisher = self.create_publisher(JointState, "door_state", QUEUE_DEPTH)
+        self._beside_publisher = self.create_publisher(JointState, "beside_state", QUEUE_DEPTH)
         self._force_publisher = self.create_publisher(WrenchStamped, "handle_force", QUEUE_DEPTH)
         self._truth_publisher = self.create_publisher(MorphingParameters, "ground_truth", latched)
         self._image_publisher = self.create_publisher(Image, "depth/image", QUEUE_DEPTH)
@@ -168,6 +170,8 @@ class SimNode(OverridableNode):
             world = Header(stamp=header.stamp, frame_id=self._settings["world_frame"])
             force = mechanism.grasp_force()
             self._force_publisher.publish(messages.force_on(force, world))
+        if simulation.beside:
+            self._beside_publisher.publish(messages.beside_state(simulation, header))
         self._statistics.track(
             robot.error(simulation.desired, state),
             simulation.controllers.progress(simulation.time),
@@ -180,9 +184,8 @@ class SimNode(OverridableNode):
         # Of the very exposure, and first: whoever needs its pose need not wait or interpolate.
         self._transforms.publish(simulation, settings, header.stamp)
         world = Header(stamp=header.stamp, frame_id=settings["world_frame"])
-        self._truth_publisher.publish(
-            messages.ground_truth(simulation.scenario, simulation.values(), world)
-        )
+        for truth in messages.ground_truths(simulation, world):
+            self._truth_publisher.publish(truth)
         camera = self._depth_camera.camera(simulation)
         if self._info_publisher.get_subscription_count():
             self._info_publisher.publish(info_from_camera(camera, header))

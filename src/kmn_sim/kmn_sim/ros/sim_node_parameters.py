@@ -16,11 +16,13 @@ from kmn_sim.robot.description import BASE_FOOTPRINT
 from kmn_sim.robot.settings import RobotSettings
 from kmn_sim.robot.urdf_export import BASE_LINK
 from kmn_sim.sensors.recording import FORMATS
+from kmn_sim.world.row import in_row
 from kmn_sim.world.scenario import Scenario, in_room
 
 ODOM, CAMERA_LINK = "odom", "camera_link"  # frames (REP-105, REP-103)
 OPTIONS = ("stem", "frame", "wall", "floor", "table")
-WORLD = ("model", "placement", "values", "seed", "direction", "room", "recess", *OPTIONS)
+PLACE = ("model", "placement", "values", "seed", "direction", "beside_gap")
+WORLD = (*PLACE, "room", "recess", *OPTIONS)
 FAULTS = ("depth_scale", "mount_offset", "mount_tilt")
 SENSOR = ("model", "camera", "camera_mount", "noise", "seed", *FAULTS)
 RECORDING = ("record", "record_rate")
@@ -86,14 +88,19 @@ def _check_frames(values: Mapping[str, Any]) -> None:
 
 def _scenario(model: KinematicModel, values: Mapping[str, Any]) -> Scenario:
     """Return the scenario of some parameters."""
+    generator = np.random.default_rng(values["seed"])
     if values["placement"] == "random":
-        placed = model.sample(np.random.default_rng(values["seed"]), 1)[0]
+        placed = model.sample(generator, 1)[0]
     elif values["placement"] == "given":
         placed = np.array(values["values"], dtype=np.float64)
     else:
-        placed = np.zeros(len(model.parameters))
+        placed = model.prototype
     options = {name: values[name] for name in OPTIONS}
     scenario = Scenario(model, placed, values["direction"], **options)
+    names = filter(None, map(str.strip, values["beside"].split(",")))
+    beside = [KinematicModel.load(name) for name in names]
+    drawn = None if values["placement"] == "prototype" else generator
+    scenario = in_row(scenario, beside, values["beside_gap"], drawn)
     if not values["room"]:
         return scenario
     recess = values["recess"] if values["recess"] >= 0.0 else None

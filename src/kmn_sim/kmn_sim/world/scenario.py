@@ -42,6 +42,10 @@ class Scenario:
         Whether a box stands on a table; then z = 0 is the table's top.
     room
         That a door stands in, instead of frame and wall alone.
+    beside
+        Objects that stand in one row with it, see `kmn_sim.world.row.in_row`.
+    in_row
+        Whether it is one of these: it stands where the row has it, be it beyond its theta's limits.
     """
 
     model: KinematicModel
@@ -53,6 +57,8 @@ class Scenario:
     floor: bool = True
     table: bool = False
     room: Room | None = None
+    beside: tuple[Scenario, ...] = ()
+    in_row: bool = False
 
     def __post_init__(self) -> None:
         if self.direction not in DIRECTIONS:
@@ -66,7 +72,8 @@ class Scenario:
                 f"model '{self.model.name}' has {len(parameters)} parameters ({names}), "
                 f"found {self.values.size} values"
             )
-        for parameter, value in zip(parameters, self.values, strict=True):
+        free = len(self.model.theta) if self.in_row else 0
+        for parameter, value in zip(parameters[free:], self.values[free:], strict=True):
             low, high = parameter.limits
             if not low <= value <= high:
                 raise ScenarioError(f"{parameter.name} = {value:g} is outside [{low:g}, {high:g}]")

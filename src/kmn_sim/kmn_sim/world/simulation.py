@@ -52,6 +52,8 @@ class Simulation:
         Simulated seconds since the start; it goes on when the scenario changes.
     mechanism, carton
         The object, one of the two.
+    beside
+        The objects that stand in one row with it.
     physics
         Client of the physics engine.
     renderer
@@ -107,6 +109,7 @@ class Simulation:
         else:
             self.carton = Carton(physics, scenario, settings.box.box)
             start = dict(zip(settings.robot.base_names, settings.box.robot, strict=True))
+        self.beside = tuple(Mechanism(physics, each, settings.door) for each in scenario.beside)
         self._stand(self._table())
         self.floor = -settings.box.table.height if scenario.table else 0.0
         self.robot = SimulatedRobot(
@@ -153,6 +156,8 @@ class Simulation:
         self.robot.update(self.desired, measured)
         if self.mechanism is not None:
             self.mechanism.update()
+        for each in self.beside:
+            each.update()
         self.physics.stepSimulation()
         self._steps += 1
 
@@ -172,18 +177,21 @@ class Simulation:
         scenario = self.scenario
         cubes = list(scenario.model.unit_cubes(*scenario.model.split(self.values())))
         if scenario.is_articulated:
-            pose = scenario.model.transformation.matrix(scenario.theta)
-            parts = chain(*object_cuboids(scenario, self.settings.door).values())
-            cubes = [part.unit_cube(pose) for part in parts]
+            cubes = [
+                part.unit_cube(each.model.transformation.matrix(each.theta))
+                for each in (scenario, *scenario.beside)
+                for part in self._parts(each)
+            ]
         around = [*self._table(), *self._ground()]
         return np.array([*cubes, *(part.unit_cube(np.eye(4)) for part in around)])
 
     def cylinder_axes(self) -> NDArray[np.int64]:
         """Return which of these cuboids (B,) hold cylinders, see `KinematicModel.cylinder_axes`."""
-        axes = self.scenario.model.cylinder_axes
-        if self.scenario.is_articulated:
-            parts = chain(*object_cuboids(self.scenario, self.settings.door).values())
-            axes = np.array([part.axis for part in parts])
+        scenario = self.scenario
+        axes = scenario.model.cylinder_axes
+        if scenario.is_articulated:
+            objects = (scenario, *scenario.beside)
+            axes = np.array([part.axis for each in objects for part in self._parts(each)])
         around = len(self._table()) + len(self._ground())
         return np.append(axes, np.full(around, NO_AXIS))
 
@@ -191,6 +199,10 @@ class Simulation:
         """End the physics engine."""
         self.renderer.close()
         self.physics.disconnect()
+
+    def _parts(self, scenario: Scenario) -> list[Cuboid]:
+        """Return the cuboids of an articulated object in its frame."""
+        return list(chain(*object_cuboids(scenario, self.settings.door).values()))
 
     def _table(self) -> list[Cuboid]:
         return table_cuboids(self.settings.box.table) if self.scenario.table else []

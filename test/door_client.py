@@ -134,7 +134,8 @@ class DoorClient(GraphClient):
         self.feedback.clear()
         self.sent.clear()
         goal = OpenDoor.Goal(**{**PULL, **angles})
-        return self.send_goal(self.action, goal, lambda m: self.feedback.append(m.feedback))
+        self.goal = self.send_goal(self.action, goal, lambda m: self.feedback.append(m.feedback))
+        return self.goal
 
     def result(self, handle: Any) -> tuple[int, OpenDoor.Result]:
         answer = self.wait(handle.get_result_async())
@@ -147,9 +148,15 @@ class DoorClient(GraphClient):
         return str(result.reason)
 
     def wait_for_phase(self, phase: str, progress: float = 0.0) -> None:
-        self.graph.wait_for(
-            lambda: any(f.phase == phase and f.progress >= progress for f in self.feedback)
-        )
+        """Wait until the goal was in a phase; fail at once if it ends before."""
+
+        def is_there() -> bool:
+            there = any(f.phase == phase and f.progress >= progress for f in self.feedback)
+            ended = self.goal.status > GoalStatus.STATUS_CANCELING
+            assert there or not ended, f"the goal ended before {phase}, {progress:.0%}"
+            return there
+
+        self.graph.wait_for(is_there)
 
     def state(self) -> tuple[float, NDArray[np.float64]]:
         """Wait for a state, and return its time (s) and the robot's positions."""

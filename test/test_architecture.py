@@ -32,6 +32,7 @@ TIERS = {
 PACKAGES = tuple(TIERS)
 ENTRY_POINTS = ("executables", "__main__", "__init__")
 ROS = re.compile(r"rclpy|tf2_ros|kmn_msgs|rcl_interfaces|builtin_interfaces|.*_msgs|std_srvs")
+BLAS = ("dot", "vdot", "linalg")
 TORCH_ROOMS = ("network", "training")
 MAX_LINES, MEDIAN_LINES = 300, 110
 
@@ -89,6 +90,23 @@ def test_simulator_and_skill_know_each_other_by_messages_only() -> None:
             assert not any(name.startswith(other) for name in imported(path)), path
     for path in sources("kmn_perception"):
         assert not any(name.startswith(("kmn_sim", "kmn_skill")) for name in imported(path)), path
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_compiled_functions_need_no_scipy(package: str) -> None:
+    """By SciPy numba compiles products of matrices and linear algebra; nodes do not have it."""
+    wrong = []
+    for path in sources(package):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(function, ast.FunctionDef):
+                continue
+            if not any("jit" in ast.unparse(each) for each in function.decorator_list):
+                continue
+            for node in ast.walk(function):
+                is_product = isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult)
+                if is_product or (isinstance(node, ast.Attribute) and node.attr in BLAS):
+                    wrong.append(f"{path.relative_to(ROOT)}, {function.name}: {ast.unparse(node)}")
+    assert not wrong
 
 
 @pytest.mark.parametrize("package", PACKAGES)

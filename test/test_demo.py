@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from kmn_perception.ros.node_process import NodeProcess, ProcessError
+from programs import INTERRUPTS
 
 
 def start_demo(domain: int, folder: Path) -> subprocess.Popen[str]:
@@ -51,7 +52,7 @@ def test_it_finds_the_boxes_and_shows_them(domain: int, tmp_path: Path) -> None:
     assert not left_behind(process.pid)
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("interrupt", INTERRUPTS)
 def test_interrupted_it_ends_morph_node_too(
     interrupt: signal.Signals, domain: int, tmp_path: Path
 ) -> None:

@@ -12,7 +12,7 @@ from ament_index_python.packages import get_package_prefix
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from programs import BROKEN_FILES, TIMEOUT, assert_file_is_refused, parameters, start
+from programs import BROKEN_FILES, INTERRUPTS, TIMEOUT, assert_file_is_refused, parameters, start
 
 COMMAND = [f"{get_package_prefix('kmn_perception')}/lib/kmn_perception/morph_node"]
 
@@ -34,7 +34,7 @@ def run_until_it_reports(
     return output
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("stop", INTERRUPTS)
 def test_node_ends_quietly_when_it_is_stopped(
     graph: Any,
     domain: int,

@@ -150,5 +150,5 @@ def test_a_drawer_that_is_stuck_is_told_by_the_force_that_it_takes(
     )
     assert result.attempts == 1
     assert abs(system.doors[-1].position[0]) < 0.01
-    assert abs(result.position) < 0.02
+    assert abs(result.position) < 0.03  # by which the fingers gave, before the force was told
     system.assert_it_holds()

@@ -43,7 +43,10 @@ def _labelled(number: int) -> list[int]:
     return [int((labels == label).sum()) for label in (20, 30, 40)]
 
 
-@pytest.mark.parametrize("topics", [["/points"], ["/depth/image", "/depth/camera_info"]])
+@pytest.mark.parametrize(
+    "topics",
+    [pytest.param(["/points"], marks=pytest.mark.slow), ["/depth/image", "/depth/camera_info"]],
+)
 def test_frames_from_another_process_are_answered_with_one_object_each(
     topics: list[str], bag: Path, client: Any, domain: int
 ) -> None:

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
+from programs import BROKEN_FILES, INTERRUPTS, assert_file_is_refused, parameters, read_until, start
 
 COMMAND = [sys.executable, "-m", "kmn_sim", "sim_node"]
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("interrupt", INTERRUPTS)
 def test_interrupted_it_ends_quietly(interrupt: signal.Signals, domain: int) -> None:
     process = start(COMMAND, domain)
     read_until("simulating model", process)

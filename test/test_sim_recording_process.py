@@ -13,7 +13,7 @@ import pytest
 from test_sim_node_process import COMMAND
 
 from graph import GraphClient
-from programs import TIMEOUT, parameters, start
+from programs import INTERRUPTS, TIMEOUT, parameters, start
 from recordings import duration
 
 ENDINGS = ("gif", "mp4")
@@ -51,7 +51,7 @@ def stop(process: Any, interrupt: signal.Signals) -> str:
     return str(printed)
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("interrupt", INTERRUPTS)
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_interrupted_it_completes_the_recording(
     client: GraphClient, domain: int, tmp_path: Path, ending: str, interrupt: signal.Signals

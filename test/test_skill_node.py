@@ -94,7 +94,8 @@ def test_a_second_goal_is_rejected_and_a_cancelled_one_holds_the_robot(system: D
 
 
 @pytest.mark.parametrize(
-    ("phase", "progress", "next_phase"), [("reach", 0.2, "reach"), ("open", 0.8, "release")]
+    ("phase", "progress", "next_phase"),
+    [pytest.param("reach", 0.2, "reach", marks=pytest.mark.slow), ("open", 0.8, "release")],
 )
 def test_after_a_cancelled_goal_the_door_is_opened_from_there(
     system: DoorClient, phase: str, progress: float, next_phase: str

@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 
 from kmn_msgs.action import OpenDoor
 from kmn_perception.ros.node_process import parameter_arguments
-from programs import read_until, start
+from programs import INTERRUPTS, read_until, start
 
 pytest.importorskip("pybullet")
 pytest.importorskip("robotic")
@@ -69,7 +69,7 @@ def client(graph: Any, domain: int) -> Iterator[DoorClient]:
         yield made
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("interrupt", INTERRUPTS)
 @pytest.mark.parametrize(
     ("phase", "source"),
     [("wait", ("-r", "morphing_parameters:=nothing")), ("plan", TRUTH), ("reach", TRUTH)],

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from kmn_msgs.action import OpenDoor
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError
-from programs import BROKEN_FILES, assert_file_is_refused, parameters, read_until, start
+from programs import BROKEN_FILES, INTERRUPTS, assert_file_is_refused, parameters, read_until, start
 
 pytest.importorskip("robotic")
 from kmn_skill.ros.locked_action_client import LockedActionClient  # noqa: E402
@@ -39,7 +39,7 @@ def runs(pid: str) -> bool:
         return False
 
 
-@pytest.mark.parametrize("interrupt", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("interrupt", INTERRUPTS)
 def test_interrupted_it_ends_quietly_and_its_planner_with_it(
     interrupt: signal.Signals, domain: int
 ) -> None:

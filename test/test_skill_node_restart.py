@@ -69,7 +69,9 @@ def system(graph: Any, home: Path) -> Iterator[Restarted]:
     made.client.stop_simulator()
 
 
-@pytest.mark.parametrize(("phase", "progress"), [("press", 0.0), ("open", 0.8)])
+@pytest.mark.parametrize(
+    ("phase", "progress"), [pytest.param("press", 0.0, marks=pytest.mark.slow), ("open", 0.8)]
+)
 def test_the_next_goal_opens_the_door(system: Restarted, phase: str, progress: float) -> None:
     client = system.client
     client.start_anew()

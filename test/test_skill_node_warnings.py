@@ -61,9 +61,9 @@ class Perception(GraphClient):
 def perception(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Perception]:
     monkeypatch.setattr(reports, "WARNING_PERIOD", 0.0)  # only what changes holds warnings back
     made = graph.start(lambda **_: Perception(graph))
-    graph.start(SkillNode)
-    made.graph.wait_for(made._publisher.get_subscription_count)
-    return made
+    with graph.running(SkillNode):
+        made.graph.wait_for(made._publisher.get_subscription_count)
+        yield made
 
 
 def test_an_unchanged_reason_is_said_once(perception: Perception) -> None:
@@ -81,6 +81,15 @@ def test_an_unchanged_reason_is_said_once(perception: Perception) -> None:
         "hidden by the robot",
     ]
     assert perception.report()["refused_status"] == "6"
+
+
+def test_an_object_of_an_unknown_model_is_told_once(perception: Perception) -> None:
+    perception.publish(3, model="no_such_thing")
+    perception.publish(1, model="../door")
+    told = [text for text in perception.log if text.startswith("object refused")]
+    assert len(told) == 1
+    assert "'no_such_thing' is neither a file nor one of the shipped" in told[0]
+    assert perception.report()["refused_unknown_model"] == "4"
 
 
 def test_who_measures_the_doors_angles_is_waited_for_only_where_one_is_named(graph: Any) -> None:

@@ -68,7 +68,7 @@ def stop_later(process: subprocess.Popen[str], number: signal.Signals, delay: fl
     return rest
 
 
-@pytest.mark.parametrize(("busy", "times"), [(0, 3), pytest.param(4, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("busy", "times"), [(0, 2), pytest.param(4, 2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("node", NODES)
 def test_nodes_stop_quietly_at_any_moment(node: str, busy: int, times: int, domain: int) -> None:
     pytest.importorskip("robotic")

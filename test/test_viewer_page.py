@@ -90,7 +90,7 @@ def test_the_page_draws_and_its_button_opens_a_door(graph: Any, domain: int, bro
         stack.enter_context(running("kmn_sim", "sim_node", domain, *simulated, *truth))
         stack.enter_context(running("kmn_skill", "skill_node", domain, *clock))
         _, address = stack.enter_context(viewer(domain, "use_sim_time:=true"))
-        page = browser.new_page(viewport={"width": 640, "height": 400})
+        page = browser.new_page(viewport={"width": 540, "height": 320})
         page.goto(address)
         page.get_by_text("idle").wait_for(timeout=PATIENCE)
         drawn = picture(page)

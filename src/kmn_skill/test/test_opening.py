@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.knowledge import Knowledge
 from kmn_skill.execution.opening import DoorOpening
+from kmn_skill.execution.other_objects import OtherObjects
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.states import Sample, StateWatch
 from kmn_skill.planning.plan import PlanningFailed, PlanRequest
@@ -70,7 +71,10 @@ class Robot:
 
 
 def pursue(
-    seen: NDArray[np.float64], remembered: bool = False, hinge: float = np.nan
+    seen: NDArray[np.float64],
+    remembered: bool = False,
+    hinge: float = np.nan,
+    beside: Sequence[DoorObservation] = (),
 ) -> tuple[Result, PlanRequest | None]:
     """Return what becomes of a goal, and what is planned for it.
 
@@ -88,8 +92,8 @@ def pursue(
     names = tuple(parameter.name for parameter in MODEL.parameters)
     for age in (0.2, 0.1, 0.0):
         covariance = 1e-8 * np.eye(len(seen))
-        told = DoorObservation(NOW - age, "door", "world", names, seen, covariance, "", hinge=hinge)
-        door.add(told)
+        told = DoorObservation(NOW - age, "door", "world", names, seen, covariance, "")
+        door.add(told._replace(joints={"hinge": hinge}))
     held = HeldDoor(
         MODEL,
         SETUP.action,
@@ -97,9 +101,11 @@ def pursue(
         SETUP.robot.planning.pads.width,
         SETTINGS.grip,
     )
-    knowledge = Knowledge(
-        MODEL, door, memory, watch, held, HandForce(), SETUP.settings.surroundings
-    )
+    others = OtherObjects(MODEL, "world", SETTINGS.door.limit_margin)
+    for each in beside:
+        others.add(each)
+    wall = SETUP.settings.surroundings
+    knowledge = Knowledge(MODEL, door, memory, watch, held, HandForce(), wall, others)
     planner, robot = Planner(), Robot()
     opening: Any = DoorOpening
     result = opening(knowledge, planner, robot, robot, SETTINGS.opening, SETTINGS.execution).run(
@@ -146,3 +152,19 @@ def test_a_door_that_is_seen_ajar_tells_by_how_much_against_where_it_was_closed(
     assert hinge_distance(MODEL, DOOR + [0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0], ajar) == (
         pytest.approx(0.5)
     )
+
+
+@pytest.mark.parametrize(("age", "remembered"), [(0.1, False), (5.0, False), (5.0, True)])
+def test_what_was_seen_beside_a_door_is_kept_clear_of_as_long_as_the_door_is_known(
+    age: float, remembered: bool
+) -> None:
+    """A robot that hides the door hides that, too."""
+    drawer = KinematicModel.load("drawer")
+    names = tuple(parameter.name for parameter in drawer.parameters)
+    values = np.array([0.1, 0.5, 0.3, *np.zeros(5)])
+    told = DoorObservation(NOW - age, "drawer", "world", names, values, np.eye(8), "", number=2)
+    _, request = pursue(DOOR, remembered, beside=[told])
+    assert request is not None
+    found = {each.name for each in request.obstacles}
+    expected = {f"drawer_2/{body.name}" for body in drawer.bodies}
+    assert found == (set() if age > SETTINGS.door.max_age and not remembered else expected)

@@ -218,8 +218,11 @@ def test_only_the_object_that_is_chosen_is_relied_on() -> None:
     for time in (0.0, 0.1, 0.2, 0.3, 0.4):
         door.add(seen(time, VALUES, number=1))
     assert door.choose(2)  # what was seen before may be of others
-    with pytest.raises(DoorError):
+    with pytest.raises(DoorError, match="no morphing parameters came yet"):
         door.values(0.4)
+    door.add(seen(0.45, VALUES, number=1))
+    with pytest.raises(DoorError, match="object 2 is not told any more; the last one .* is 1"):
+        door.values(0.45)
     for time in (0.5, 0.6, 0.7, 0.8, 0.9):
         door.add(seen(time, VALUES, number=1))
         door.add(seen(time, other, number=2))

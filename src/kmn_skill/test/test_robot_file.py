@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ import yaml
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.experiments.settings import Experiment
+from kmn_skill.planning.check import PlanRejected
 from kmn_skill.planning.phases import PhaseName
 from kmn_skill.planning.plan import PlanningFailed, PlanRequest
 from kmn_skill.planning.planner import Planner
@@ -22,6 +25,7 @@ from kmn_skill.planning.prototypes import Prototypes
 from kmn_skill.planning.robot import RobotModel
 from kmn_skill.planning.robot_chain import chain_of
 from kmn_skill.planning.robot_frames import joint_problem
+from kmn_skill.planning.solver import Solver
 from kmn_skill.planning.world import CONTACTS, GRASP, PADS, TOOL, World
 
 DOOR = KinematicModel.load("door")
@@ -90,6 +94,29 @@ def test_another_robot_opens_a_door_by_its_file_alone(panda: PlanningSetup, angl
     pads = world.poses(positions[None], [*PADS, *CONTACTS, GRASP])[0, :, :3, 3]
     assert pads[:2] == pytest.approx(pads[2:4], abs=1e-3)
     assert plan.object_joints[-1, 0] == pytest.approx(angle, abs=0.01)
+
+
+def test_a_wide_hand_takes_a_lever_in_a_deep_recess_nearer_to_its_end() -> None:
+    """Held at its usual place, its palm would touch the frame."""
+    experiment = Experiment.load()
+    shipped = PlanningSetup.load(experiment.kinematic_model(in_room=True), PANDA)
+    patient = shipped.settings.planner._replace(attempt_limit=100.0)  # on a busy machine
+    room = replace(shipped, settings=replace(shipped.settings, planner=patient))
+    values = np.array([0.01, 0.16, 0.6, 0.02, -0.08, -0.02, 0.04])
+    request = experiment.request(room, values, "push", recess=0.09)
+    solutions = Prototypes.load("door", PANDA)
+    usual, other = list(solutions.guesses(request, count=1, spread=0.0, holds=2))
+    assert (usual.hold, other.hold) == (0, 1)
+    solver = Solver(room)
+    with pytest.raises(PlanRejected, match="no motion was found"):
+        solver.plan(request, usual.solution, usual.name)
+    with Planner(room, solutions) as planner:
+        plan = planner.plan(request)
+    world = solver.world(replace(request, hold=1))
+    positions = np.hstack([plan.positions, plan.object_joints])[-1].copy()
+    positions[len(plan.joint_names) - 1] = world.touching
+    pads = world.poses(positions[None], [*PADS, *CONTACTS])[0, :, :3, 3]
+    assert pads[:2] == pytest.approx(pads[2:], abs=1e-3)
 
 
 def set_at(*keys: str, value: Any) -> Edit:

@@ -12,7 +12,7 @@ from kmn_skill.ros.messages import observation_from_message
 
 
 def problem(**fields: Any) -> str:
-    return observation_from_message(MorphingParameters(**fields), "hinge").problem
+    return observation_from_message(MorphingParameters(**fields)).problem
 
 
 @pytest.mark.parametrize("kind", ["", "lever"])
@@ -45,19 +45,19 @@ def test_a_door_whose_handle_may_be_a_lever_from_near_lacks_its_handle_only(
     status: int, kind: str, mirrored: bool, lacks: bool
 ) -> None:
     message = MorphingParameters(status=status, reason="so", alternative=kind, mirrored=mirrored)
-    assert observation_from_message(message, "hinge").lacks_handle == lacks
+    assert observation_from_message(message).lacks_handle == lacks
 
 
 def test_the_recess_is_read_where_it_is_told() -> None:
     names, values = ["tilt", "recess"], [0.2, 0.07]
     message = MorphingParameters(surroundings_names=names, surroundings=values)
-    assert observation_from_message(message, "hinge").recess == 0.07
+    assert observation_from_message(message).recess == 0.07
     for short in (MorphingParameters(), MorphingParameters(surroundings_names=["recess"])):
-        assert math.isnan(observation_from_message(short, "hinge").recess)
+        assert math.isnan(observation_from_message(short).recess)
 
 
-def test_the_hinge_is_read_where_its_angle_is_told() -> None:
+def test_joints_are_read_where_their_positions_are_told() -> None:
     message = MorphingParameters(joint_names=["handle", "hinge"], joint_positions=[-0.1, 0.3])
-    assert observation_from_message(message, "hinge").hinge == 0.3
+    assert observation_from_message(message).joints == {"handle": -0.1, "hinge": 0.3}
     for short in (MorphingParameters(), MorphingParameters(joint_names=["hinge"])):
-        assert math.isnan(observation_from_message(short, "hinge").hinge)
+        assert not observation_from_message(short).joints

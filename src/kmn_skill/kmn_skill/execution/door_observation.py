@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_skill.execution.errors import DoorError
 
 
 class DoorObservation(NamedTuple):
@@ -34,9 +37,9 @@ class DoorObservation(NamedTuple):
         Of the panel's front behind the wall's face, metres; NaN where unknown.
     number
         Of the object, the same in all frames.
-    hinge
-        Angle of the hinge, radians: the values are of the closed door then. NaN where unknown: they
-        are of the door as it stands.
+    joints
+        Positions of joints by their names, m or rad: the values are of the closed door then. Where
+        that of its hinge is not among them, they are of the door as it stands.
     """
 
     time: float
@@ -49,7 +52,39 @@ class DoorObservation(NamedTuple):
     lacks_handle: bool = False
     number: int = 0
     recess: float = math.nan
-    hinge: float = math.nan
+    joints: Mapping[str, float] = MappingProxyType({})
+
+
+def check_values(
+    model: KinematicModel, observation: DoorObservation, frame: str, limit_margin: float
+) -> None:
+    """Raise a `DoorError` if the values are not such of a model in a frame.
+
+    Parameters
+    ----------
+    limit_margin
+        Part of its range by which a parameter may exceed its limits.
+    """
+    if observation.frame != frame:
+        raise DoorError("frame", f"the door is given in '{observation.frame}', expected '{frame}'")
+    names = tuple(parameter.name for parameter in model.parameters)
+    count = len(names)
+    shapes = observation.values.shape, observation.covariance.shape
+    if observation.names != names or shapes != ((count,), (count, count)):
+        raise DoorError(
+            "names",
+            f"found the {observation.values.size} parameters {', '.join(observation.names)} "
+            f"with {observation.covariance.size} covariances, expected {', '.join(names)}",
+        )
+    if not np.isfinite(observation.values).all():
+        raise DoorError("not_finite", f"parameters are not finite: {observation.values.tolist()}")
+    for parameter, value in zip(model.parameters, observation.values, strict=True):
+        low, high = parameter.limits
+        margin = limit_margin * (high - low)
+        if not low - margin <= value <= high + margin:
+            raise DoorError(
+                "out_of_limits", f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]"
+            )
 
 
 def when_closed(

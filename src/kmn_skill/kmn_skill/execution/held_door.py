@@ -130,7 +130,7 @@ class HeldDoor:
                 f"the handle is {expected:.3f} m thick"
             )
             if width > expected and self._action.unlatch is not None:
-                stopped, crooked = self._aside(width)
+                stopped, crooked = self._aside(pads, width)
                 raise BlockedHandError(text, width, stopped, crooked)
             raise ExecutionError(MISSED_HANDLE, text)
         back = np.linalg.inv(self._motion(angles))
@@ -242,17 +242,18 @@ class HeldDoor:
         _, gamma = self._model.split(self._values)
         return self._action.grasp.thickness(gamma)
 
-    def _aside(self, width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return both offsets (3,) of a handle from a hand whose fingers stay so far apart (m).
+    def _aside(
+        self, pads: NDArray[np.float64], width: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return both offsets (3,) of a handle from pads (2, 3) that stay so far apart (m).
 
         Both fingers close alike. The first one that touches a handle that lies aside takes it along
         to where it can be pressed; where it cannot be, it is stopped there, and the hand stands.
         What is pressed turns, and may come to lie crooked between the edges of both fingers.
         """
-        theta, gamma = self._model.split(self._values)
-        grasp, thickness = self._action.grasp, self._thickness()
-        place = np.array([*grasp.place(gamma), 1.0])
-        axis = AXES.index(grasp.axis)
+        theta, _ = self._model.split(self._values)
+        thickness, place = self._thickness(), np.array([*pads.mean(axis=0), 1.0])
+        axis = AXES.index(self._action.grasp.axis)
         pressed = (self._motion(np.array([0.0, -STEP])) @ place - place)[axis]
         # A bar of this thickness between edges that are so far apart, and the pad's width aside.
         across = np.hypot(width, self._pad_width)

@@ -8,6 +8,7 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
+from kmn_skill.execution.other_objects import OtherObjects
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.states import StateWatch
 from kmn_skill.planning.surroundings import SurroundingsSettings
@@ -30,6 +31,8 @@ class Knowledge(NamedTuple):
         Of the hand on what it holds.
     wall
         Around the door, where there is one.
+    others
+        Objects beside the door.
     """
 
     model: KinematicModel
@@ -39,3 +42,4 @@ class Knowledge(NamedTuple):
     held: HeldDoor
     force: HandForce
     wall: SurroundingsSettings
+    others: OtherObjects

@@ -64,7 +64,7 @@ class DoorOpening:
     ) -> None:
         self._model, self._door, self._memory = knowledge.model, knowledge.door, knowledge.memory
         self._watch, self._held, self._wall = knowledge.watch, knowledge.held, knowledge.wall
-        self._action = self._model.actions[0]
+        self._others, self._action = knowledge.others, self._model.actions[0]
         self._planner, self._commands, self._client = planner, commands, client
         self._settings = settings
         self._robot = RobotFollowing(knowledge, commands, client, execution)
@@ -197,6 +197,8 @@ class DoorOpening:
         if not math.isfinite(hinge):  # as it stands
             hinge = self._hinge_of(seen, state, closed)
             values = when_closed(self._model, seen, hinge)
+        # What is beside it may be hidden from then on, too.
+        self._others.forget_older(self._commands.now(), self._door.settings.max_age)
         self._memory.keep(values, state.robot, state.time)
         self._held.see(values, hinge)
         return values
@@ -227,7 +229,7 @@ class DoorOpening:
             object_start=np.array([state.hinge, state.handle]),
             unlatched=goal.unlatched,
             target=goal.target,
-            obstacles=self._obstacles(gamma),
+            obstacles=(*self._surroundings(gamma), *self._others.around(self._model, values)),
         )
         try:
             plan = self._planner.plan(request, lambda: self._client.interruption() is not None)
@@ -240,8 +242,8 @@ class DoorOpening:
         self._commands.show(plan, values)
         return plan
 
-    def _obstacles(self, gamma: NDArray[np.float64]) -> tuple[Obstacle, ...]:
-        """Return what stands around a door of configuration parameters (m,)."""
+    def _surroundings(self, gamma: NDArray[np.float64]) -> tuple[Obstacle, ...]:
+        """Return the wall around a door of configuration parameters (m,)."""
         if self._settings.surroundings != WALL:
             return ()
         seen = self._door.recess

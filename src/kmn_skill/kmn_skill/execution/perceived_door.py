@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.execution.door_observation import DoorObservation
+from kmn_skill.execution.door_observation import DoorObservation, check_values
 from kmn_skill.execution.errors import DoorError, UncertainDoorError
 from kmn_skill.execution.grasp_quantities import YAW, grasp_deviations, grasp_quantities
 
@@ -73,11 +73,12 @@ class PerceivedDoor:
 
     def __init__(self, model: KinematicModel, frame: str, settings: AcceptanceSettings) -> None:
         self._model, self._frame, self.settings = model, frame, settings
+        self._joint = model.actions[0].joint.name
         self._lock = threading.Lock()
         self._unseen: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)  # the last, without handle
         self._kept: deque[DoorObservation] = deque(maxlen=MAX_FRAMES)
         self._refused: DoorError | None = None  # the last one
-        self._chosen = 0
+        self._chosen = self._other = 0  # the number of the object, and of the last one ignored
         self._since = -math.inf  # seconds; what was seen before was another world
         self.recess = self.hinge = math.nan
         count = len(model.parameters)
@@ -95,6 +96,7 @@ class PerceivedDoor:
         """
         with self._lock:
             if self._chosen not in (0, observation.number):
+                self._other = observation.number
                 return
             try:
                 self._check(observation)
@@ -118,8 +120,9 @@ class PerceivedDoor:
             self._kept.append(observation)
             if math.isfinite(observation.recess):
                 self.recess = observation.recess
-            if math.isfinite(observation.hinge):
-                self.hinge = observation.hinge
+            hinge = observation.joints.get(self._joint, math.nan)
+            if math.isfinite(hinge):
+                self.hinge = hinge
 
     def choose(self, number: int) -> bool:
         """Rely on the object of a number only, 0: on whichever is seen; tell if it is another."""
@@ -128,16 +131,25 @@ class PerceivedDoor:
             if is_another:
                 self._kept.clear()
                 self._unseen.clear()
-                self._refused = None
+                self._refused, self._other = None, 0
             self._chosen = number
             return is_another
+
+    def _missing(self) -> str:
+        """Return what did not come, where nothing was refused."""
+        if self._chosen and self._other:
+            return (
+                f"object {self._chosen} is not told any more; the last one that was told is "
+                f"{self._other}"
+            )
+        return "no morphing parameters came yet"
 
     def forget(self, now: float) -> None:
         """Forget all observations from before a time (s), as of another world."""
         with self._lock:
             self._kept.clear()
             self._unseen.clear()
-            self._refused = None
+            self._refused, self._other = None, 0
             self._since = now
             self.recess = self.hinge = math.nan
 
@@ -158,7 +170,7 @@ class PerceivedDoor:
         with self._lock:
             kept, refused = list(self._kept)[-settings.min_consistent_frames :], self._refused
         if not kept:
-            raise refused or DoorError("none", "no morphing parameters came yet")
+            raise refused or DoorError("none", self._missing())
         _check_age(now - kept[-1].time, settings.max_age)
         if len(kept) < settings.min_consistent_frames:
             before = f"; before: {refused}" if refused else ""
@@ -224,37 +236,13 @@ class PerceivedDoor:
     def _check(self, observation: DoorObservation) -> None:
         """Raise if an observation is not usable at all."""
         model = self._model
-        names = tuple(parameter.name for parameter in model.parameters)
         problem, is_another = observation.problem, observation.model != model.name
         another = f"parameters are of model '{observation.model}', expected '{model.name}'"
         if problem and not observation.lacks_handle:
             raise DoorError("status", f"{another}; {problem}" if is_another else problem)
         if is_another:
             raise DoorError("model", another)
-        if observation.frame != self._frame:
-            raise DoorError(
-                "frame", f"the door is given in '{observation.frame}', expected '{self._frame}'"
-            )
-        count = len(names)
-        shapes = observation.values.shape, observation.covariance.shape
-        if observation.names != names or shapes != ((count,), (count, count)):
-            raise DoorError(
-                "names",
-                f"found the {observation.values.size} parameters {', '.join(observation.names)} "
-                f"with {observation.covariance.size} covariances, expected {', '.join(names)}",
-            )
-        if not np.isfinite(observation.values).all():
-            raise DoorError(
-                "not_finite", f"parameters are not finite: {observation.values.tolist()}"
-            )
-        for parameter, value in zip(model.parameters, observation.values, strict=True):
-            low, high = parameter.limits
-            margin = self.settings.limit_margin * (high - low)
-            if not low - margin <= value <= high + margin:
-                raise DoorError(
-                    "out_of_limits",
-                    f"{parameter.name} = {value:.3f} is outside [{low:g}, {high:g}]",
-                )
+        check_values(model, observation, self._frame, self.settings.limit_margin)
         if observation.lacks_handle:
             raise DoorError(HANDLE_NOT_SEEN, problem)
 

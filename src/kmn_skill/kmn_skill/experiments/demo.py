@@ -13,7 +13,8 @@ from kmn_perception.command_line.columns import columns
 from kmn_perception.configuration.node_parameters import load_node_parameters
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.ros.program import own_arguments, ros_session
-from kmn_skill.experiments.door_system import DoorSystem, Opened
+from kmn_skill.experiments.beside import add_beside_option
+from kmn_skill.experiments.door_system import DoorSystem
 from kmn_skill.experiments.evaluate import NOISES, add_control, random_rooms
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.narrator import Narrator
@@ -24,12 +25,15 @@ from kmn_skill.experiments.settings import (
     add_robot_option,
     chosen_mode,
 )
+from kmn_skill.experiments.trials import Opened
 
 
 def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     """Open one random door and tell how it went; return whether it is open."""
+    options.room = experiment.stands_in_room(options)
     model = experiment.kinematic_model(options.object, options.room)
-    values = experiment.random_objects(model, options.room, 1, options.seed)[0]
+    in_row = bool(options.beside)
+    values = experiment.random_objects(model, options.room, 1, options.seed, in_row)[0]
     options.mode = chosen_mode(model.actions[0], options.mode)
     task, pace = (model.actions[0], options.mode), experiment.demo
     sim = {**pace._asdict(), "noise": options.noise, "seed": options.seed}
@@ -61,7 +65,8 @@ def run(options: argparse.Namespace, experiment: Experiment) -> bool:
     print(comparison(model, values, opened.perceived))
     print(summary(opened))
     print(f"recording {recording}, pictures {strip}")
-    return bool(opened.result.success) and experiment.is_open(*task, opened.hinge)
+    is_open = bool(opened.result.success) and experiment.is_open(*task, opened.hinge)
+    return is_open and not opened.moved
 
 
 def comparison(
@@ -84,6 +89,8 @@ def summary(opened: Opened) -> str:
         f"contact error {1e3 * result.contact_error:.2f} mm, attempts {result.attempts}\n"
         f"opened to {opened.hinge:.2f}, told as {result.position:.2f} [m, rad]"
     )
+    if opened.moved:
+        text += f"\n{opened.moved}"
     return text if result.success else f"{text}\nit was not opened: {result.reason}"
 
 
@@ -117,6 +124,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     )
     add_robot_option(parser)
     add_object_option(parser)
+    add_beside_option(parser)
     return parser.parse_args(argv)
 
 

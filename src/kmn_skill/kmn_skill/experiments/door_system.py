@@ -32,9 +32,11 @@ from kmn_perception.ros.node_process import (
     parameter_arguments,
 )
 from kmn_skill.execution.goal import Goal
+from kmn_skill.experiments.beside import FIRST_ID, Beside
 from kmn_skill.experiments.patience import Patience
 from kmn_skill.experiments.settings import Experiment
-from kmn_skill.experiments.stopwatch import Measured, Stopwatch
+from kmn_skill.experiments.stopwatch import Stopwatch
+from kmn_skill.experiments.trials import Opened
 from kmn_skill.planning.layout import MOVED
 from kmn_skill.planning.surroundings import WALL
 from kmn_skill.ros.locked_action_client import LockedActionClient
@@ -56,28 +58,6 @@ class Room(NamedTuple):
     recess: float
 
 
-class Opened(NamedTuple):
-    """What became of a goal.
-
-    Attributes
-    ----------
-    result
-        Of the action.
-    perceived
-        The last parameters (n + m,) that skill_node could take when the goal was sent; where there
-        were none, those that it refused.
-    hinge
-        Angle of the door in the physics at the end, radians.
-    measured
-        Times, forces and errors on the way.
-    """
-
-    result: OperateJoint.Result
-    perceived: NDArray[np.float64]
-    hinge: float
-    measured: Measured
-
-
 class DoorSystem:
     """Starts the nodes and is a client of theirs, up to the end of a context.
 
@@ -90,7 +70,7 @@ class DoorSystem:
         ``parameters``, where skill_node takes it from, one of ``SOURCES``; ``room``, whether it is
         a door that stands in a room, and is perceived by depth and image; and ``control``, how
         skill_node moves the robot, ``topic`` or ``action``; and, if it is to be started,
-        ``viewer``, parameters of that.
+        ``viewer``, parameters of that; and ``beside``, see `Beside`.
     experiment
         Models of the doors, and how long to wait for what.
 
@@ -106,7 +86,8 @@ class DoorSystem:
         in_rooms, robot = options.room, options.robot
         model = experiment.room.model if in_rooms else options.object or experiment.model
         around = {"robot": robot, "model": model, "direction": options.mode, "image": in_rooms}
-        self._sim = {**sim, **around}
+        self._beside = Beside(options, experiment.row.closed)
+        self._sim = {**sim, **around, **self._beside.of_sim_node()}
         if in_rooms:
             self._sim["renderer"] = "software"  # EGL's highlights are none of a room's light
         self._source, self._in_rooms = options.parameters, in_rooms
@@ -141,7 +122,13 @@ class DoorSystem:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def show(self, values: NDArray[np.float64], direction: str, room: Room | None = None) -> None:
+    def show(
+        self,
+        values: NDArray[np.float64],
+        direction: str,
+        room: Room | None = None,
+        seed: int | None = None,
+    ) -> None:
         """Set up a closed door of morphing parameters (n + m,), and the robot where it starts.
 
         Returns when skill_node knows of this door only.
@@ -150,11 +137,14 @@ class DoorSystem:
         ----------
         room
             That the door stands in.
+        seed
+            That draws what stands beside it; None: as before.
         """
         scene = self._timeouts.scene
         around = {"room": False} if room is None else {"room": True, **room._asdict()}
         given = [float(value) for value in values]
-        self._set(placement="given", values=given, direction=direction, **around)
+        drawn = {} if seed is None else {"seed": seed}
+        self._set(placement="given", values=given, direction=direction, **around, **drawn)
         if room is not None:
             wall: dict[str, Any] = {"surroundings": WALL}
             if self._source != "perceived":
@@ -164,14 +154,15 @@ class DoorSystem:
         truth = self._client.wait(lambda: self._truth_of(values), scene, "sim_node")
         since = Time.from_msg(truth.header.stamp)
         self._seen.clear()
-        frames = self._patience.new_frames
+        count = self._patience.new_frames * (1 + self._beside.count)
         self._client.wait(
-            lambda: self._count_since(since) >= frames, scene, "what perceives the door"
+            lambda: self._count_since(since) >= count, scene, "what perceives the door"
         )
 
     def open(self, goal: Goal, feedback: Callable[[OperateJoint.Feedback], None]) -> Opened:
         """Open the door that is there; ``feedback`` is told what is being done."""
-        last = next((m for m in reversed(self._seen) if m.status == m.OK), self._seen[-1])
+        assert self._truth is not None  # since `show`
+        last = self._beside.meant(self._seen, self._truth)
         perceived = np.array([*last.theta, *last.gamma])
 
         def progress(message: OperateJoint.Feedback) -> None:
@@ -179,18 +170,22 @@ class DoorSystem:
             feedback(message)
 
         self._stopwatch.start(self._opened * goal.target)
-        answer = self._send(goal, progress)
+        self._beside.watch()
+        answer = self._send(goal, progress, last.id if self._beside.count else 0)
         self._client.wait(answer.done, self._timeouts.goal, "skill_node")
         self._stopwatch.stop()
         reported = self._stopwatch.reports
         self._client.wait(  # for the report of the last second
             lambda: self._stopwatch.reports > reported, self._timeouts.scene, "sim_node"
         )
-        return Opened(answer.result().result, perceived, self._hinge, self._stopwatch.measured)
+        measured, moved = self._stopwatch.measured, self._beside.moved()
+        return Opened(answer.result().result, perceived, self._hinge, measured, moved)
 
-    def _send(self, goal: Goal, feedback: Callable[[OperateJoint.Feedback], None]) -> Future:
-        """Send a goal, and return its result to come."""
-        request = OperateJoint.Goal(target=goal.target)
+    def _send(
+        self, goal: Goal, feedback: Callable[[OperateJoint.Feedback], None], number: int = 0
+    ) -> Future:
+        """Send a goal for the object of a number, 0: any, and return its result to come."""
+        request = OperateJoint.Goal(target=goal.target, object_id=number)
         accepted = self._action.send_goal_async(
             request, feedback_callback=lambda message: feedback(message.feedback)
         )
@@ -216,7 +211,8 @@ class DoorSystem:
             ("kmn_skill", "skill_node", skill, [door]),
         ]
         if self._source == "perceived":
-            morph = {**simulated, "reliability": "reliable"}
+            models = self._beside.of_morph_node(self._sim["model"])
+            morph = {**simulated, "reliability": "reliable", **models}
             if self._in_rooms:  # the simulated sensor's depth is not off as a whole
                 morph["calibration"] = "calibrated"
             nodes.append(("kmn_perception", "morph_node", morph, []))
@@ -244,6 +240,8 @@ class DoorSystem:
             MorphingParameters, SOURCES[self._source], self._on_parameters, QUEUE_DEPTH
         )
         node.create_subscription(JointState, "door_state", self._on_door, QUEUE_DEPTH)
+        beside = self._beside
+        node.create_subscription(JointState, "beside_state", beside.on_state, QUEUE_DEPTH)
         watch = self._stopwatch
         node.create_subscription(WrenchStamped, "handle_force", watch.on_force, QUEUE_DEPTH)
         node.create_subscription(DiagnosticArray, "/diagnostics", watch.on_reports, QUEUE_DEPTH)
@@ -278,7 +276,8 @@ class DoorSystem:
         )
 
     def _on_truth(self, message: MorphingParameters) -> None:
-        self._truth = message
+        if message.id <= FIRST_ID:  # not of those beside it
+            self._truth = message
 
     def _on_parameters(self, message: MorphingParameters) -> None:
         self._seen.append(message)

@@ -18,6 +18,7 @@ from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.noisy_sensor import SENSORS
 from kmn_perception.ros.program import EXPECTED, own_arguments, ros_session
 from kmn_perception.sharing.experiment import ExperimentCommand, SharedExperiment
+from kmn_skill.experiments.beside import add_beside_option, model_names
 from kmn_skill.experiments.door_system import ON_ROBOT, SOURCES, DoorSystem, Room
 from kmn_skill.experiments.film_strip import save_strip
 from kmn_skill.experiments.settings import (
@@ -45,6 +46,7 @@ NAMED = (
     "control",
     "camera",
     "faults",
+    "beside",
 )  # options that are kept with the result
 
 
@@ -96,7 +98,9 @@ class DoorTrials:
     def __call__(self, number: int) -> Trial:
         """Return what became of a door; save a strip of pictures of the first if asked for."""
         values, strip = self._doors[number], None if number else self._options.strip
-        self._system.show(values, self._options.mode, self._rooms[number])
+        options = self._options
+        seed = options.seed + number if options.beside else None
+        self._system.show(values, options.mode, self._rooms[number], seed)
         with tempfile.TemporaryDirectory() as folder:
             recording = Path(folder) / "recording.gif"
             rate = self._experiment.recording.rate
@@ -108,17 +112,18 @@ class DoorTrials:
                 save_strip(recording, strip, self._experiment.recording.strip)
         result = opened.result
         is_open = self._experiment.is_open(*self._task, opened.hinge)
+        wrong = "" if is_open or result.reason else "the door is not open in the physics"
         return Trial(
             values=values,
             executed=result.success,
-            opened=is_open,
+            opened=is_open and not opened.moved,
             planning_time=result.planning_time,
             contact_error=result.contact_error,
             clearance=result.clearance,
             attempts=result.attempts,
             hinge=opened.hinge,
             told=result.position,
-            reason=result.reason or ("" if is_open else "the door is not open in the physics"),
+            reason="; ".join(filter(None, (result.reason, wrong, opened.moved))),
             measured=opened.measured,
         )
 
@@ -172,15 +177,22 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--strip", type=output_file, help="file for pictures of the first door")
     add_robot_option(parser)
     add_object_option(parser)
+    add_beside_option(parser)
     return parser
 
 
 def prepare(options: argparse.Namespace) -> SharedExperiment[Trial]:
     """Return the experiment that the options tell."""
     experiment = Experiment.load()
+    options.room = experiment.stands_in_room(options)
     model = experiment.kinematic_model(options.object, options.room)
     options.mode = chosen_mode(model.actions[0], options.mode)
-    doors = experiment.random_objects(model, options.room, options.doors, options.seed)
+    beside, count = model_names(options.beside), options.doors
+    doors = experiment.random_objects(model, options.room, count, options.seed, bool(beside))
+    files = [
+        experiment.model_file(options.object, options.room),
+        *map(experiment.model_file, beside),
+    ]
 
     def conclude(trials: list[Trial]) -> tuple[str, Any]:
         result = tally(trials)
@@ -193,7 +205,7 @@ def prepare(options: argparse.Namespace) -> SharedExperiment[Trial]:
         kind=Trial,
         make=partial(DoorTrials, options, model, doors),
         conclude=conclude,
-        depends_on={"model file": short_hash(experiment.model_file(options.object, options.room))},
+        depends_on={"model file": " ".join(map(short_hash, files))},
     )
 
 

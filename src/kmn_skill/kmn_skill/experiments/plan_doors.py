@@ -131,6 +131,7 @@ def parser() -> argparse.ArgumentParser:
 def prepare(options: argparse.Namespace) -> SharedExperiment[Planned]:
     """Return the experiment that the options tell."""
     experiment = Experiment.load()
+    options.room = experiment.stands_in_room(options)
     model = experiment.kinematic_model(options.object, options.room)
     model = chosen_action(model, options.action)
     setup = PlanningSetup.load(model, options.robot)

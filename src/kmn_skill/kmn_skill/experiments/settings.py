@@ -22,6 +22,7 @@ from kmn_perception.configuration.settings import (
 from kmn_perception.model.actions import Action
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.goal import Goal
+from kmn_skill.experiments.beside import Row
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.planning_setup import PlanningSetup
 from kmn_skill.planning.prototypes import PULL, PUSH
@@ -134,6 +135,8 @@ class Experiment(NamedTuple):
         Kinematic model of doors that stand alone.
     room
         Doors that stand in rooms.
+    row
+        Objects with others beside them.
     opened
         Part of its target from which on an object counts as open.
     evaluation, real_time, demo
@@ -148,6 +151,7 @@ class Experiment(NamedTuple):
 
     model: str
     room: RoomDoors
+    row: Row
     opened: Fraction
     evaluation: Pace
     real_time: Pace
@@ -161,6 +165,10 @@ class Experiment(NamedTuple):
     def load(cls) -> Experiment:
         """Read the file; raise ``ConfigurationError`` if it is wrong."""
         return load_settings(cls, resources.find("config/skill", "experiment"))
+
+    def stands_in_room(self, options: argparse.Namespace) -> bool:
+        """Tell whether what is to be opened does: as it is asked for, or a door with walls."""
+        return options.room or options.object == self.room.model
 
     def kinematic_model(self, name: str | Path = "", in_room: bool = False) -> KinematicModel:
         """Load the model of a name, by default that of doors that stand alone, or in rooms.
@@ -181,13 +189,14 @@ class Experiment(NamedTuple):
         return resources.find("config/models", self.room.model if in_room else name or self.model)
 
     def random_objects(
-        self, model: KinematicModel, in_room: bool, count: int, seed: int
+        self, model: KinematicModel, in_room: bool, count: int, seed: int, in_row: bool = False
     ) -> NDArray[np.float64]:
         """Return morphing parameters (count, n + m): alone, over the model's whole limits."""
         generator = np.random.default_rng(seed)
-        if not in_room:
+        if not in_room and not in_row:
             return model.sample(generator, count)
-        limits = np.array([self.room.limits[each.name] for each in model.parameters])
+        narrower = self.room.limits if in_room else self.row.limits
+        limits = np.array([narrower.get(each.name, each.limits) for each in model.parameters])
         return generator.uniform(limits[:, 0], limits[:, 1], (count, len(limits)))
 
     def goal(self, action: Action, mode: str) -> Goal:

@@ -9,8 +9,34 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kmn_msgs.action import OperateJoint
 from kmn_perception.command_line.columns import columns
 from kmn_skill.experiments.stopwatch import Measured
+
+
+class Opened(NamedTuple):
+    """What became of a goal.
+
+    Attributes
+    ----------
+    result
+        Of the action.
+    perceived
+        The last parameters (n + m,) that skill_node could take when the goal was sent; where there
+        were none, those that it refused.
+    hinge
+        Angle of the door in the physics at the end, radians.
+    measured
+        Times, forces and errors on the way.
+    moved
+        Which joints of objects beside it were moved; empty if none was.
+    """
+
+    result: OperateJoint.Result
+    perceived: NDArray[np.float64]
+    hinge: float
+    measured: Measured
+    moved: str
 
 
 class Trial(NamedTuple):

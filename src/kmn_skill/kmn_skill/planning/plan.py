@@ -39,6 +39,8 @@ class PlanRequest:
         positive away from it (push).
     obstacles
         What stands around the object.
+    hold
+        Number of the offset at which the hand takes hold, see `Grasp.offsets`.
     """
 
     theta: NDArray[np.float64]
@@ -48,6 +50,7 @@ class PlanRequest:
     unlatched: float
     target: float
     obstacles: tuple[Obstacle, ...] = ()
+    hold: int = 0
 
     @property
     def configuration(self) -> NDArray[np.float64]:

@@ -99,8 +99,9 @@ class Planner:
             raise PlanningFailed("the request has numbers that are not finite")
         begin, left = time.monotonic(), self._time_limit
         reasons = []
+        holds = len(self._setup.action.grasp.offsets)
         for guess in self._prototypes.guesses(
-            request, self._settings.attempts, self._settings.spread
+            request, self._settings.attempts, self._settings.spread, holds
         ):
             if left <= 0.0:
                 reasons.append(f"the {self._time_limit:g} s are over")
@@ -225,7 +226,7 @@ class Planner:
         """Return the plan that a first guess leads to, or why there is none."""
         deadline = time.monotonic() + limit
         try:
-            connection.send((request, guess))
+            connection.send((replace(request, hold=guess.hold), guess))
             while not connection.poll(POLL_PERIOD):
                 if cancelled():
                     self._restart()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import cycle
+from itertools import cycle, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_skill.planning.layout import BASE_AND_ARM, ROBOT
 from kmn_skill.planning.plan import PlanRequest
 from kmn_skill.planning.robot import default_robot
+from kmn_skill.planning.surroundings import WALL
 
 PULL, PUSH = "pull", "push"
 PUSH_IN_WALL = "push_in_wall"  # where the robot cannot stand beside the opening
@@ -37,10 +38,14 @@ class Solution(NamedTuple):
 
 
 class Guess(NamedTuple):
-    """A first guess: its name, and the solution that it is."""
+    """A first guess: its name, the solution that it is, and where the hand takes hold.
+
+    The latter is the number of an offset, see `Grasp.offsets`.
+    """
 
     name: str
     solution: Solution
+    hold: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,20 +122,24 @@ class Prototypes:
                 f"robot and model are {', '.join(joints)}: make them anew by make_prototypes"
             )
 
-    def guesses(self, request: PlanRequest, count: int, spread: float) -> Iterator[Guess]:
-        """Yield first guesses: the solutions of its kind, then variations of them.
+    def guesses(
+        self, request: PlanRequest, count: int, spread: float, holds: int = 1
+    ) -> Iterator[Guess]:
+        """Yield first guesses: the solutions of its kind for each hold, then variations of them.
 
         Parameters
         ----------
         request
             The solution for the most similar door comes first.
         count
-            Number of guesses.
+            Number of guesses for each hold.
         spread
             Standard deviation of base and arm from the solution, m and rad.
+        holds
+            Number of offsets at which the hand may take hold.
         """
         name = direction(request.target)
-        if name == PUSH and request.obstacles:
+        if name == PUSH and any(each.name.startswith(WALL) for each in request.obstacles):
             name = PUSH_IN_WALL
         if not self.solutions[name]:
             return
@@ -138,14 +147,15 @@ class Prototypes:
             self.solutions[name],
             key=lambda known: float(np.linalg.norm(known.gamma - request.gamma)),
         )
-        for number, solution in enumerate(nearest[:count]):
-            yield Guess(f"{name} {number}" if number else name, solution)
+        known = list(product(range(holds), nearest[:count]))
+        for number, (hold, solution) in enumerate(known):
+            yield Guess(f"{name} {number}" if number else name, solution, hold)
         generator = np.random.default_rng(0)
-        for number, (gamma, path) in zip(range(len(nearest), count), cycle(nearest)):
+        for number, (hold, (gamma, path)) in zip(range(len(known), count * holds), cycle(known)):
             varied = path.copy()
             moving = varied[1:, ROBOT][:, BASE_AND_ARM]
             moving += generator.normal(0.0, spread, moving.shape[1])
-            yield Guess(f"{name}, varied {number}", Solution(gamma, varied))
+            yield Guess(f"{name}, varied {number}", Solution(gamma, varied), hold)
 
 
 def _read(stored: Section, name: str, columns: int) -> list[Solution]:

@@ -55,7 +55,8 @@ class PlannerSettings(NamedTuple):
         Pairs that are further apart in the first guess are left out in the first solution, and
         those further apart in that one in the final solution, metres.
     attempts, spread
-        Number of first guesses, and the standard deviation (m and rad) by which they vary.
+        Number of first guesses for each offset of the grasp, and the standard deviation (m and rad)
+        by which they vary.
     noise
         Standard deviation of what is added to the first guess, m and rad.
     violation

@@ -35,7 +35,7 @@ class Solver:
 
     def world(self, request: PlanRequest) -> World:
         """Return the world of a request's object and of what stands around it."""
-        return World(self._setup, request.theta, request.gamma, request.obstacles)
+        return World(self._setup, request.theta, request.gamma, request.obstacles, request.hold)
 
     def plan(self, request: PlanRequest, guess: Solution, name: str) -> Plan:
         """Return a plan that passes the check.

@@ -14,11 +14,20 @@ WALL = "wall"
 
 
 class Obstacle(NamedTuple):
-    """A cuboid that stands still: centre and size (3,) in the object frame, metres."""
+    """A cuboid that stands still.
+
+    Attributes
+    ----------
+    centre, size
+        (3,) in the object frame, metres.
+    rotation
+        (3, 3) of its axes in that frame; None: they are parallel.
+    """
 
     name: str
     centre: NDArray[np.float64]
     size: NDArray[np.float64]
+    rotation: NDArray[np.float64] | None = None
 
 
 class SurroundingsSettings(NamedTuple):

@@ -34,7 +34,11 @@ def transfer(
         positions = guess[:, OBJECT_JOINTS][:, column]
         positions[:] = _stretched(positions, request.object_start[column], goal)
     pose = model.transformation.matrix(request.theta)
-    joint, here, there = action.joint, action.grasp.place(solved), action.grasp.place(request.gamma)
+    joint, here, there = (
+        action.joint,
+        action.grasp.place(solved),
+        action.grasp.place(request.gamma, request.hold),
+    )
     for before, after in zip(path, guess, strict=True):
         closed = joint.motion(solved, before[OBJECT_JOINTS][MOVED])
         opened = pose @ joint.motion(request.gamma, after[OBJECT_JOINTS][MOVED])

@@ -53,6 +53,8 @@ class World:
         (n,) transformation and (m,) configuration parameters.
     obstacles
         What stands around the object.
+    hold
+        Number of the offset at which the hand takes hold, see `Grasp.offsets`.
 
     Attributes
     ----------
@@ -79,6 +81,7 @@ class World:
         theta: NDArray[np.float64],
         gamma: NDArray[np.float64],
         obstacles: Sequence[Obstacle] = (),
+        hold: int = 0,
     ) -> None:
         robot = setup.robot
         self.setup, self._gamma, self._obstacles = setup, gamma, obstacles
@@ -92,9 +95,10 @@ class World:
             size = boxes(robot)[name].size
             add_box(self.configuration, blunt(name), name, np.zeros(3), size, np.inf)
         _add_object(self.configuration, setup, theta, gamma)
-        for name, centre, size in obstacles:
-            add_frame(self.configuration, name, OBJECT, centre).setShape(ry.ST.box, size)
-        self._add_contacts()
+        for name, centre, size, rotation in obstacles:
+            frame = add_frame(self.configuration, name, OBJECT, centre, rotation)
+            frame.setShape(ry.ST.box, size)
+        self._add_contacts(hold)
         self.configuration.selectJoints(list(self.model_joints))
 
     def limits(self) -> NDArray[np.float64]:
@@ -125,17 +129,17 @@ class World:
             body = model.body(model.stem.joint.body)
             centre, size = model.stem.cuboid(gamma)
             found[STEM] = Box(object_body(body.name), centre - body.centre(gamma), size)
-        found.update({o.name: Box(OBJECT, o.centre, o.size) for o in self._obstacles})
+        found.update({o.name: Box(o.name, np.zeros(3), o.size) for o in self._obstacles})
         return found
 
-    def _add_contacts(self) -> None:
+    def _add_contacts(self, hold: int) -> None:
         """Add the two points of the gripper, those of what it grasps, and frames between them.
 
         The frame of the grasp has x ahead, as the object, and z from the one point to the other.
         """
         robot, grasp, gamma = self.setup.robot, self.setup.action.grasp, self._gamma
         body = object_body(grasp.body.name)
-        place = grasp.place(gamma) - grasp.body.centre(gamma)
+        place = grasp.place(gamma, hold) - grasp.body.centre(gamma)
         across = np.eye(3)[AXES.index(grasp.axis)]
         ahead = np.eye(3)[0] if grasp.axis != "x" else np.eye(3)[1]
         turn = np.column_stack([ahead, np.cross(across, ahead), across])

@@ -8,6 +8,7 @@ from kmn_skill.execution.door_memory import DoorMemory
 from kmn_skill.execution.hand_force import HandForce
 from kmn_skill.execution.held_door import HeldDoor
 from kmn_skill.execution.knowledge import Knowledge
+from kmn_skill.execution.other_objects import OtherObjects
 from kmn_skill.execution.perceived_door import PerceivedDoor
 from kmn_skill.execution.states import StateWatch
 from kmn_skill.planning.planner import Planner
@@ -23,7 +24,8 @@ class ActionSkill(NamedTuple):
     setup
         Of the object with this action alone.
     knowledge
-        Of the world, as far as this action needs it; the robot's states are those of all.
+        Of the world, as far as this action needs it; the robot's states and the objects beside this
+        one are those of all.
     """
 
     setup: PlanningSetup
@@ -38,6 +40,7 @@ class ActionSkill(NamedTuple):
         settings: SkillNodeSettings,
         memory: DoorMemory,
         watch: StateWatch,
+        others: OtherObjects,
     ) -> ActionSkill:
         """Return the skill, which knows of no object yet."""
         model = setup.model
@@ -50,6 +53,7 @@ class ActionSkill(NamedTuple):
             HeldDoor(model, setup.action, planner.pads, width, settings.grip),
             HandForce(),
             setup.settings.surroundings,
+            others,
         )
         return cls(setup, planner, knowledge)
 

@@ -37,14 +37,8 @@ HANDLE_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=1.0)
 DOOR_COLOUR = ColorRGBA(r=0.94, g=0.65, b=0.24, a=0.3)
 
 
-def observation_from_message(message: MorphingParameters, hinge: str) -> DoorObservation:
-    """Read morphing parameters, be they valid or not.
-
-    Parameters
-    ----------
-    hinge
-        Name of the joint about which the door turns.
-    """
+def observation_from_message(message: MorphingParameters) -> DoorObservation:
+    """Read morphing parameters, be they valid or not."""
     values = np.array([*message.theta, *message.gamma], dtype=np.float64)
     covariance = np.array(message.covariance, dtype=np.float64)
     if covariance.size == values.size**2:
@@ -59,8 +53,8 @@ def observation_from_message(message: MorphingParameters, hinge: str) -> DoorObs
         problem=_problem(message),
         lacks_handle=_lacks_handle(message),
         number=message.id,
-        recess=_told(message.surroundings_names, message.surroundings, RECESS),
-        hinge=_told(message.joint_names, message.joint_positions, hinge),
+        recess=_told(message.surroundings_names, message.surroundings).get(RECESS, math.nan),
+        joints=_told(message.joint_names, message.joint_positions),
     )
 
 
@@ -73,9 +67,9 @@ def force_from_wrench(message: WrenchStamped) -> NDArray[np.float64]:
     return read
 
 
-def _told(names: Sequence[str], values: Sequence[float], name: str) -> float:
-    """Return the value of a name, NaN where it is not told."""
-    return float(dict(zip(names, values, strict=False)).get(name, math.nan))
+def _told(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    """Return values by name, as far as they are told."""
+    return {name: float(value) for name, value in zip(names, values, strict=False)}
 
 
 def _lacks_handle(message: MorphingParameters) -> bool:

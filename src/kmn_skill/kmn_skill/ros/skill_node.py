@@ -35,6 +35,7 @@ from kmn_skill.execution.door_observation import DoorObservation
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.goal import Goal, Result
 from kmn_skill.execution.opening import DoorOpening
+from kmn_skill.execution.other_objects import OtherObjects, UnknownModelError
 from kmn_skill.execution.plan_execution import Part
 from kmn_skill.execution.states import BASE, StateWatch
 from kmn_skill.planning.plan import Plan
@@ -86,6 +87,9 @@ class SkillNode(OverridableNode):
         self._ending = ExitStack()
         self._watch = StateWatch(
             settings.states, self._states.joints, continuous=setup.robot.continuous
+        )
+        self._others = OtherObjects(
+            settings.model, settings.world_frame, settings.door.limit_margin
         )
         self._skills = [self._make_skill(each) for each in setups]
         self._skill = self._skills[0]  # of the goal that is pursued
@@ -150,7 +154,7 @@ class SkillNode(OverridableNode):
         motions = Prototypes.load(setup.action.motions, settings.robot)
         planner = self._ending.enter_context(Planner(setup, motions, settings.planning_time))
         memory = DoorMemory(self._memory_file(setup), self.tell)
-        return ActionSkill.make(setup, planner, settings, memory, self._watch)
+        return ActionSkill.make(setup, planner, settings, memory, self._watch, self._others)
 
     def _memory_file(self, setup: PlanningSetup) -> Path:
         """Return the file in which this node keeps the door, beside the logs of ROS.
@@ -199,6 +203,7 @@ class SkillNode(OverridableNode):
         breaks = watch.breaks
         watch.put(topic, sample)
         if watch.breaks != breaks:
+            self._others.forget(sample.time)
             for skill in self._skills:
                 skill.forget(sample.time)
             self._warnings.warn("break", f"another world: {watch.last_break}")
@@ -215,9 +220,12 @@ class SkillNode(OverridableNode):
                 skill.knowledge.force.put(seconds(message.header.stamp), force)
 
     def _on_parameters_of_door(self, message: MorphingParameters) -> None:
-        for skill, frames in zip(self._skills, self._frames, strict=True):
-            joint = skill.setup.action.joint.name
-            observation = messages.observation_from_message(message, joint)
+        observation = messages.observation_from_message(message)
+        try:
+            self._others.add(observation)
+        except UnknownModelError as error:
+            self._refuse("object", "unknown_model", error)
+        for frames in self._frames:
             frames.take(observation, message.header.stamp)
 
     def _use(self, number: int, observation: DoorObservation) -> None:
@@ -265,6 +273,7 @@ class SkillNode(OverridableNode):
             return SetParametersResult(successful=False, reason=str(error))
         self._settings = settings
         self._watch.settings = settings.states
+        self._others.limit_margin = settings.door.limit_margin
         for skill, frames in zip(self._skills, self._frames, strict=True):
             skill.take(settings)
             frames.settings = settings

@@ -72,6 +72,39 @@ def test_the_object_itself_is_no_obstacle_under_any_name(model: str, number: int
     assert around(seen(values, kinematic, number=number)) == ()
 
 
+@pytest.mark.parametrize(
+    ("name", "opened"),
+    [("door", -0.31), ("door", -0.9), ("room_door", -0.5), ("cupboard_door", -1.2), ("drawer", 0.2)],
+)
+@pytest.mark.parametrize("off", [0.0, 0.08])
+def test_the_object_itself_is_no_obstacle_where_it_is_seen_open(
+    name: str, opened: float, off: float
+) -> None:
+    model = KinematicModel.load(name)
+    joint, theta = model.actions[0].joint, np.array([-0.7, -0.4, 0.6])
+    gamma = np.zeros(len(model.gamma))
+    pose = model.transformation.matrix(theta) @ joint.motion(gamma, opened)
+    askew = model.transformation.read_back(pose) + [off, -off, 0.0]  # as if it was closed
+    others = OtherObjects(model, "world", 10.0)
+    others.add(seen(np.array([*askew, *gamma]), model))
+    assert others.around(model, np.array([*theta, *gamma])) == ()
+
+
+@pytest.mark.parametrize("name", ["door", "room_door", "cupboard_door", "drawer"])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("turned", [0.0, -0.3, 0.3])
+def test_another_object_of_the_same_model_that_touches_it_is_an_obstacle(
+    name: str, side: float, turned: float
+) -> None:
+    model = KinematicModel.load(name)
+    gamma = np.zeros(len(model.gamma))
+    cubes = model.unit_cubes(np.zeros(3), gamma)
+    width = max(float(np.linalg.norm(cube[:3, 1])) for cube in cubes)
+    others = OtherObjects(model, "world", 10.0)
+    others.add(seen(np.array([0.0, side * width, turned, *gamma]), model))
+    assert len(others.around(model, np.array([0.0, 0.0, 0.0, *gamma]))) == len(model.bodies)
+
+
 def test_another_object_of_the_same_model_is_an_obstacle() -> None:
     beside = OPENED + [0.0, -0.65, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert len(around(seen(beside, DRAWER), seen(OPENED, DRAWER, number=1))) == 3

@@ -12,6 +12,7 @@ from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_skill.execution.door_observation import DoorObservation, check_values
 from kmn_skill.execution.errors import DoorError
+from kmn_skill.execution.grasp_quantities import swung
 from kmn_skill.planning.surroundings import Obstacle
 
 MAX_OBJECTS = 100  # that are kept, the newest ones
@@ -81,7 +82,9 @@ class OtherObjects:
     def around(self, model: KinematicModel, values: NDArray[np.float64]) -> tuple[Obstacle, ...]:
         """Return the bodies of the others, in the frame of an object of parameters (n + m,).
 
-        One whose middle is within that object is the object itself, under whatever name.
+        One whose middle is within that object is the object itself, under whatever name; so is one
+        of its own model that overlaps with it where its joint has moved to, as perception may tell
+        an open door as a closed one that stands askew.
         """
         theta, gamma = model.split(values)
         back = model.transformation.inverse(theta)
@@ -91,9 +94,14 @@ class OtherObjects:
         found = list[Obstacle]()
         for (name, number), each in kept.items():
             other = self._models[name]
-            middle = np.mean(_box(back @ other.unit_cubes(*other.split(each.values))), axis=0)
+            middle = _middle(back @ other.unit_cubes(*other.split(each.values)))
             if ((low < middle) & (middle < high)).all():
                 continue
+            if name == model.name:
+                opened = {model.actions[0].joint.name: swung(model, values, each.values)}
+                distance = middle - _middle(back @ model.moved_cubes(values, opened))
+                if np.linalg.norm(distance) < (high - low)[:2].max() / 2.0:
+                    continue
             cubes = back @ other.moved_cubes(each.values, _positions(other, each))
             for body, cube in zip(other.bodies, cubes, strict=True):
                 size = np.linalg.norm(cube[:3, :3], axis=0)
@@ -117,6 +125,12 @@ def _box(cubes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lowest and the highest corner (2, 3) of maps (B, 4, 4) of the unit cube."""
     corners = cubes[:, None, :3, 3] + CORNERS @ cubes[:, :3, :3].swapaxes(1, 2)
     return np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+
+
+def _middle(cubes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the middle (3,) of the box around maps (B, 4, 4) of the unit cube."""
+    middle: NDArray[np.float64] = np.mean(_box(cubes), axis=0)
+    return middle
 
 
 def _positions(model: KinematicModel, observation: DoorObservation) -> dict[str, float]:

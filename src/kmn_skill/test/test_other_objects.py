@@ -74,7 +74,13 @@ def test_the_object_itself_is_no_obstacle_under_any_name(model: str, number: int
 
 @pytest.mark.parametrize(
     ("name", "opened"),
-    [("door", -0.31), ("door", -0.9), ("room_door", -0.5), ("cupboard_door", -1.2), ("drawer", 0.2)],
+    [
+        ("door", -0.31),
+        ("door", -0.9),
+        ("room_door", -0.5),
+        ("cupboard_door", -1.2),
+        ("drawer", 0.2),
+    ],
 )
 @pytest.mark.parametrize("off", [0.0, 0.08])
 def test_the_object_itself_is_no_obstacle_where_it_is_seen_open(

@@ -25,7 +25,7 @@ from kmn_skill.experiments.settings import Experiment, random_recesses  # noqa: 
 EXPERIMENT = Experiment.load()
 MODEL = EXPERIMENT.kinematic_model(in_room=True)
 GRASP = 0.02  # metres that the gripper forgives
-VERTICAL = 1.5e-3  # radians, by which a handle at 2 m is 3 mm too high or too low
+VERTICAL = 8e-4  # radians, by which a handle at 2 m is 1.6 mm too high or too low
 
 
 def perceive(
@@ -83,7 +83,7 @@ def test_the_handle_and_the_edges_are_where_they_stand(direction: str, seed: int
 
 @pytest.mark.parametrize("seed", [1, 5, 8])
 def test_the_vertical_is_seen_as_it_is(seed: int) -> None:
-    """By lines of the image, which have no steps as those of a renderer that samples pixels."""
+    """By long lines more than by short ones, in an image without the steps of sampled pixels."""
     values = EXPERIMENT.random_objects(MODEL, True, 1, seed)[0]
     found = perceive(values, "pull", seed)
     up, seen = MODEL.camera.pose[2, :3], found.camera_pose[2, :3]

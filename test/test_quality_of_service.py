@@ -81,7 +81,7 @@ def test_what_is_overridden_is_so_and_nothing_else(graph: Any, observer: Node) -
             return info.qos_profile
 
         assert told("depth/image").reliability == ReliabilityPolicy.RELIABLE
-        for topic in ("depth/camera_info", "points"):  # as the parameter reliability has it
+        for topic in ("depth/camera_info", "points"):  # nobody publishes them
             assert told(topic).reliability == ReliabilityPolicy.BEST_EFFORT
         description = told("object_description", published=True)
         assert description.reliability == ReliabilityPolicy.BEST_EFFORT

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
+from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
 from kmn_perception.ros.message_gaps import MessageGaps
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.program import ros_session
@@ -28,7 +29,7 @@ PERIOD = 1.0 / 30.0  # seconds
 PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 SENDERS = ("with_our_profile", "foreign")  # one that was started without it
 DISCOVERY_TIMEOUT = 20.0  # seconds
-DISCOVERY_MARGIN = 0.5  # seconds for both sides to know each other
+DISCOVERY_MARGIN = 2.0  # seconds for both sides to know each other, and how reliable they are
 FLUSH = 2.0  # seconds for the last clouds to arrive
 
 
@@ -61,10 +62,8 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -
             milliseconds.append(age.nanoseconds * 1e-6)
             bar.update()
 
-        reliability = ReliabilityPolicy[settings.reliability.upper()]
-        newest = QoSProfile(depth=1, reliability=reliability)
-        # rclpy calls with the message's info too, of which its annotations know nothing.
-        subscription = node.create_subscription(PointCloud2, TOPIC, receive, newest)  # type: ignore[arg-type]
+        subscriptions = CameraSubscriptions(node, ReliabilityPolicy[settings.reliability.upper()])
+        subscriptions.subscribe(PointCloud2, TOPIC, receive)
         publisher = multiprocessing.get_context("spawn").Process(
             target=publish, args=(settings.model, frames, sender), daemon=True
         )
@@ -78,7 +77,7 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -
         finally:
             publisher.kill()
             publisher.join()
-            node.destroy_subscription(subscription)
+            subscriptions.end(TOPIC)
     if publisher.exitcode != 0:
         raise ChildProcessError(f"the publishing process ended with {publisher.exitcode}")
     return {

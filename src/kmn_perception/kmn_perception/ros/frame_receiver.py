@@ -8,10 +8,10 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
+from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
 from kmn_perception.ros.exposures import Exposures, Order
 from kmn_perception.ros.frame_statistics import FrameStatistics
 from kmn_perception.ros.image_transport import transported
@@ -42,6 +42,8 @@ class FrameReceiver:
 
     Parameters
     ----------
+    node, subscriptions
+        Who subscribes, and how.
     settings
         Returns the node's present settings.
 
@@ -54,7 +56,7 @@ class FrameReceiver:
     def __init__(
         self,
         node: Node,
-        reliability: ReliabilityPolicy,
+        subscriptions: CameraSubscriptions,
         settings: Callable[[], MorphNodeSettings],
         statistics: FrameStatistics,
         warnings: ThrottledWarnings,
@@ -67,13 +69,11 @@ class FrameReceiver:
             None  # before any camera_info, and since
         )
         self.camera_info: CameraInfo | None = None
-        newest = QoSProfile(depth=1, reliability=reliability)
         # Taken in this order where several came: an image after the camera_info published with it.
-        # rclpy calls with the message's info too, of which its annotations know nothing.
-        node.create_subscription(CameraInfo, "depth/camera_info", self._on_camera_info, newest)
+        subscriptions.subscribe(CameraInfo, "depth/camera_info", self._on_camera_info)
         kind, topic = transported(node, "depth/image", settings().depth_image_transport)
-        node.create_subscription(kind, topic, self._on_image, newest)  # type: ignore[arg-type]
-        node.create_subscription(PointCloud2, "points", self._on_points, newest)  # type: ignore[arg-type]
+        subscriptions.subscribe(kind, topic, self._on_image)
+        subscriptions.subscribe(PointCloud2, "points", self._on_points)
 
     def take(self) -> Frame | None:
         """Wait for the newest frame and take it; None once the receiver is closed."""

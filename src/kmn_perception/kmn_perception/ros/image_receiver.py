@@ -10,16 +10,14 @@ from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
 from kmn_perception.ros.image_transport import transported
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.messages.compressed import raw_image
 from kmn_perception.ros.messages.grey import grey_in_view
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
-from kmn_perception.ros.overridable_node import overridden
 from kmn_perception.ros.reports import ThrottledWarnings, make_status
 from kmn_perception.ros.stamps import NANOSECONDS
 from kmn_perception.scene.depth_view import DepthView
@@ -38,8 +36,8 @@ class ImageReceiver:
 
     Parameters
     ----------
-    node, transport, reliability
-        Who subscribes, to which transport of the image, and how.
+    node, subscriptions, transport
+        Who subscribes, how, and to which transport of the image.
     warnings
         Where to tell what is wrong with images.
     """
@@ -47,16 +45,16 @@ class ImageReceiver:
     def __init__(
         self,
         node: Node,
+        subscriptions: CameraSubscriptions,
         transport: str,
-        reliability: ReliabilityPolicy,
         warnings: ThrottledWarnings,
     ) -> None:
-        self._node, self._warnings = node, warnings
+        self._node, self._subscriptions, self._warnings = node, subscriptions, warnings
         self._kind, topic = transported(node, "image", transport)
         self._topics = [node.resolve_topic_name("image/camera_info"), topic]
-        newest = QoSProfile(depth=1, reliability=reliability)
-        self._profiles = [overridden(node, Subscription, name, newest) for name in self._topics]
-        self._subscriptions: list[Subscription] = []
+        for name in self._topics:
+            subscriptions.declare(name)
+        self._listens = False
         self._changed = threading.Condition()
         self._images: deque[_Stamped] = deque(maxlen=KEPT)
         self._info: CameraInfo | None = None
@@ -65,19 +63,16 @@ class ImageReceiver:
 
     def listen(self, wanted: bool) -> None:
         """Subscribe, or no longer."""
-        if wanted and not self._subscriptions:
-            subscribe = self._node.create_subscription
-            self._subscriptions = [
-                subscribe(CameraInfo, self._topics[0], self._on_info, self._profiles[0]),
-                subscribe(self._kind, self._topics[1], self._on_image, self._profiles[1]),
-            ]
+        if wanted and not self._listens:
+            self._subscriptions.subscribe(CameraInfo, self._topics[0], self._on_info)
+            self._subscriptions.subscribe(self._kind, self._topics[1], self._on_image)
         elif not wanted:
-            for subscription in self._subscriptions:
-                self._node.destroy_subscription(subscription)
-            self._subscriptions = []
+            for topic in self._topics:
+                self._subscriptions.end(topic)
             with self._changed:
                 self._images.clear()
                 self._info = None
+        self._listens = wanted
 
     def add_to(
         self, view: DepthView, settings: MorphNodeSettings, patience: float
@@ -89,7 +84,7 @@ class ImageReceiver:
         patience
             Seconds to wait for an image that is not there yet.
         """
-        if not settings.use_image or not self._subscriptions or not view.is_organised:
+        if not settings.use_image or not self._listens or not view.is_organised:
             return view, ""
         has_info, has_images = (self._node.count_publishers(topic) > 0 for topic in self._topics)
         if not self._images and not has_images:

@@ -23,6 +23,7 @@ from kmn_perception.doors.door_tracker import DoorTracker
 from kmn_perception.estimate import Estimate, Status
 from kmn_perception.pipeline_interface import ObjectEstimate, Pipeline
 from kmn_perception.ros.camera_poses import CameraPoses
+from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
 from kmn_perception.ros.frame_estimates import DetectedObject, FrameEstimates
 from kmn_perception.ros.frame_receiver import Frame, FrameReceiver, read_cloud
 from kmn_perception.ros.frame_statistics import FrameStatistics
@@ -84,15 +85,15 @@ class MorphNode(OverridableNode):
         self._tracker = ObjectTracker(settings.object_distance, scene.memory)
         self._warnings, self._failures = ThrottledWarnings(self), ChangeWarnings(self)
         self._connect()
-        reliability = ReliabilityPolicy[settings.reliability.upper()]
+        subscriptions = CameraSubscriptions(self, ReliabilityPolicy[settings.reliability.upper()])
         self._frames = FrameReceiver(
             self,
-            reliability,
+            subscriptions,
             lambda: self._active.settings,
             self._statistics,
             self._warnings,
         )
-        self._images = ImageReceiver(self, settings.image_transport, reliability, self._warnings)
+        self._images = ImageReceiver(self, subscriptions, settings.image_transport, self._warnings)
         self._cameras = CameraPoses(self, self._warnings)
         self._listen()
         self.add_on_set_parameters_callback(self._on_parameters)

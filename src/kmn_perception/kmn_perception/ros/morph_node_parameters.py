@@ -34,7 +34,7 @@ class MorphNodeSettings:
     transform_delay
         How long a frame waits for its transforms, seconds.
     reliability
-        Of the subscriptions, ``best_effort`` or ``reliable``.
+        Of the subscriptions to the camera, ``best_available``, ``best_effort`` or ``reliable``.
     depth_image_transport, image_transport
         How depth images and the images beside them come, ``raw`` or compressed.
     objects

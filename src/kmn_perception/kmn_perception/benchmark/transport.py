@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from kmn_perception.benchmark.scene import full_cloud
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
+from kmn_perception.ros.camera_subscriptions import DEPTH, CameraSubscriptions
 from kmn_perception.ros.message_gaps import MessageGaps
 from kmn_perception.ros.morph_node_parameters import MorphNodeSettings
 from kmn_perception.ros.program import ros_session
@@ -98,7 +98,7 @@ def publish(model: str, frames: int, sender: str) -> None:
 
 
 def _publish(node: Node, cloud: PointCloud2, frames: int) -> None:
-    publisher = node.create_publisher(PointCloud2, TOPIC, QoSProfile(depth=1))
+    publisher = node.create_publisher(PointCloud2, TOPIC, QoSProfile(depth=DEPTH))
     deadline = time.monotonic() + DISCOVERY_TIMEOUT
     while not publisher.get_subscription_count() and time.monotonic() < deadline:
         time.sleep(PERIOD)

@@ -16,6 +16,7 @@ from rclpy.subscription import Subscription
 from kmn_perception.ros.overridable_node import overridden
 
 PERIOD = 0.5  # seconds between two looks at who publishes
+DEPTH = 5  # messages that wait: those that are sent again come in bursts
 
 
 @dataclass
@@ -27,7 +28,7 @@ class _Subscribed:
 
 
 class CameraSubscriptions:
-    """Makes subscriptions that keep the newest message.
+    """Makes subscriptions that lose nothing of what comes, if they can.
 
     A cloud that fits no buffer on its way arrives where both sides are reliable, and who asks for
     more than is offered receives nothing: ``best_available`` is reliable where all publishers of
@@ -41,7 +42,7 @@ class CameraSubscriptions:
     """
 
     def __init__(self, node: Node, reliability: ReliabilityPolicy) -> None:
-        self._node, self._newest = node, QoSProfile(depth=1, reliability=reliability)
+        self._node, self._wanted = node, QoSProfile(depth=DEPTH, reliability=reliability)
         self._subscribed: dict[str, _Subscribed] = {}
         # A steady clock: a simulated time may not have begun.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -49,7 +50,7 @@ class CameraSubscriptions:
 
     def declare(self, topic: str) -> QoSProfile:
         """Return how a topic is subscribed to; declare the parameters by which users choose it."""
-        return overridden(self._node, Subscription, topic, self._newest)
+        return overridden(self._node, Subscription, topic, self._wanted)
 
     def subscribe(self, kind: Any, topic: str, callback: Callable[..., None]) -> None:
         """Subscribe to a topic."""

@@ -229,6 +229,10 @@ def test_a_training_goes_on_from_a_weight_file(tmp_path: Path) -> None:
             not torch.equal(tensor, given.network.state_dict()[name])
             for name, tensor in loaded.network.state_dict().items()
         )
+        assert (loaded.baseline is None) == (given.baseline is None)
+        if loaded.baseline is not None and given.baseline is not None:  # the first one's
+            for name, tensor in given.baseline.state_dict().items():
+                assert torch.equal(tensor, loaded.baseline.state_dict()[name])
 
 
 def test_a_network_of_another_design_is_not_trained_on(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ class Algorithm2(Training):
         settings = self.settings
         assert isinstance(settings, Algorithm2Settings)
         self.encoding = ParameterEncoding(self.model, self.model.symmetry)
-        self.baseline = copy.deepcopy(self.network)
+        self.baseline = self.first_baseline or copy.deepcopy(self.network)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
         self.augmented = math.ceil(self.samples * settings.augmentation)  # N_aug
 
@@ -76,8 +76,8 @@ class Algorithm2(Training):
         return mse_loss(outputs, self.encoding.encode(values))
 
     def end_round(self) -> None:
-        """Keep the first network as the baseline."""
-        if self.state.round == 0:
+        """Keep the first network as the baseline, if there is none yet."""
+        if self.state.round == 0 and self.first_baseline is None:
             self.baseline = copy.deepcopy(self.network)
 
 

@@ -76,7 +76,7 @@ def train(options: argparse.Namespace) -> None:
     folder = options.run or options.out.with_suffix(".run")
     torch.set_num_threads(options.threads)
     torch.manual_seed(settings.seed)
-    network, origin = _network(model, settings, options.start)
+    network, baseline, origin = _networks(model, settings, options.start)
     with Workers(options.device) as workers:
         if options.restart and workers.rank == 0 and folder.exists():
             shutil.rmtree(folder)
@@ -89,7 +89,7 @@ def train(options: argparse.Namespace) -> None:
         for interruption in (signal.SIGINT, signal.SIGTERM):
             signal.signal(interruption, run.interrupt)
         training = procedure_of(settings.network)(
-            network, settings, shared.validation, run, workers, options.jobs
+            network, settings, shared.validation, run, workers, options.jobs, baseline
         )
         workers.say(
             f"training '{model.name}' on {workers.device}; curves and checkpoints: {folder}"
@@ -100,14 +100,14 @@ def train(options: argparse.Namespace) -> None:
             workers.say(f"wrote {options.out}")
 
 
-def _network(
+def _networks(
     model: KinematicModel, settings: TrainingSettings, start: str | None
-) -> tuple[MorphNetwork, dict[str, Any]]:
-    """Return the network that the training begins with, and what a weight file says of it."""
+) -> tuple[MorphNetwork, MorphNetwork | None, dict[str, Any]]:
+    """Return the network that the training begins with, its baseline, and what is said of them."""
     design = Section(settings.design, "training settings: design")
     untrained = DESIGNS[settings.network].untrained(model, design)
     if start is None:
-        return untrained, {}
+        return untrained, None, {}
     given = weights.load(start, model)
     if _design(given.network) != _design(untrained):
         raise weights.WeightsError(
@@ -116,7 +116,7 @@ def _network(
         )
     known = ("training", "errors", "start")
     origin = {key: given.metadata[key] for key in known if key in given.metadata}
-    return given.network.requires_grad_(True), {"start": origin}
+    return given.network.requires_grad_(True), given.baseline, {"start": origin}
 
 
 def _design(network: MorphNetwork) -> dict[str, Any]:

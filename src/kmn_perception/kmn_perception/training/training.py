@@ -46,13 +46,15 @@ class Training(ABC):
     Parameters
     ----------
     network
-        Untrained.
+        Untrained, or one that is trained on.
     run
         Keeps checkpoints and curves.
     workers
         The processes that train together; each generates and keeps its own share of the data.
     jobs
         How many generate the data of each of them.
+    baseline
+        What a network that is trained on was before its data were augmented, if that is known.
     """
 
     settings_type: ClassVar[type[TrainingSettings]] = TrainingSettings
@@ -67,8 +69,10 @@ class Training(ABC):
         run: Run,
         workers: Workers,
         jobs: int = 1,
+        baseline: MorphNetwork | None = None,
     ) -> None:
         self.network, self.model = network.to(workers.device), network.model
+        self.first_baseline = baseline and baseline.to(workers.device)
         self.settings, self.validation, self.run, self.workers = settings, validation, run, workers
         self.jobs, self.state = jobs, TrainingState()
         self.samples = math.ceil(settings.samples / workers.count)  # N_data of this worker

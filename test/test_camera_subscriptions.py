@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import CameraInfo, PointCloud2
 
 from kmn_perception.ros.camera_subscriptions import PERIOD, CameraSubscriptions
 from kmn_perception.ros.morph_node import MorphNode
@@ -30,8 +30,8 @@ class Listener(Node):
     def __init__(self, reliability: ReliabilityPolicy, **options: Any) -> None:
         super().__init__("listener", **options)
         self.heard: list[PointCloud2] = []
-        self.subscriptions_to_camera = CameraSubscriptions(self, reliability)
-        self.subscriptions_to_camera.subscribe(PointCloud2, "points", self.heard.append)
+        self.camera = CameraSubscriptions(self, reliability)
+        self.listening = self.camera.subscribe(PointCloud2, "points", self.heard.append)
 
 
 @pytest.fixture(scope="module")
@@ -92,10 +92,47 @@ def test_what_is_not_wanted_any_more_stays_away(graph: Any, camera: Node) -> Non
         graph.running(Listener, reliability=BEST_AVAILABLE) as node,
     ):
         graph.wait_for(lambda: told(camera) == [RELIABLE])
-        node.subscriptions_to_camera.end("points")
+        node.camera.end(node.listening)
         graph.wait_for(lambda: told(camera) == [])
         time.sleep(3.0 * PERIOD)
         assert told(camera) == []
+
+
+def test_two_subscriptions_to_one_topic_do_not_know_of_each_other(graph: Any, camera: Node) -> None:
+    with graph.running(Listener, reliability=BEST_AVAILABLE) as node:
+        again: list[PointCloud2] = []
+        second = node.camera.subscribe(PointCloud2, "points", again.append)
+        with publishing(camera, RELIABLE):
+            graph.wait_for(lambda: told(camera) == 2 * [RELIABLE])
+        with publishing(camera, BEST_EFFORT) as publisher:
+            graph.wait_for(lambda: told(camera) == 2 * [BEST_EFFORT])
+            graph.wait_for(lambda: publisher.publish(PointCloud2()) or (node.heard and again))
+            node.camera.end(second)
+            graph.wait_for(lambda: told(camera) == [BEST_EFFORT])
+            node.heard.clear()
+            graph.wait_for(lambda: publisher.publish(PointCloud2()) or node.heard)
+
+
+def test_one_description_for_depth_and_image_is_heard_whether_images_are_used_or_not(
+    graph: Any, camera: Node
+) -> None:
+    arguments = ["--ros-args", "-r", "depth/camera_info:=info", "-r", "image/camera_info:=info"]
+    options = {"parameter_overrides": [Parameter("model", value="room_door")]}
+    publisher = camera.create_publisher(CameraInfo, "info", 1)
+    with graph.running(MorphNode, cli_args=arguments, **options) as node:
+        for is_used in (True, False, True, False):
+            node.set_parameters([Parameter("use_image", value=is_used)])
+            graph.wait_for(
+                lambda used=is_used: len(camera.get_subscriptions_info_by_topic("info")) == 1 + used
+            )
+            info = CameraInfo(width=640 + is_used)
+
+            def comes(info: CameraInfo = info) -> bool:
+                publisher.publish(info)
+                return node._frames.camera_info == info
+
+            graph.wait_for(comes)
+    camera.destroy_publisher(publisher)
 
 
 @pytest.mark.parametrize("name", ["reliability", "qos_overrides./points.subscription.reliability"])

@@ -111,6 +111,17 @@ def test_another_object_of_the_same_model_that_touches_it_is_an_obstacle(
     assert len(others.around(model, np.array([0.0, 0.0, 0.0, *gamma]))) == len(model.bodies)
 
 
+def test_a_low_cabinet_before_a_tall_one_is_no_drawer_pulled_out_of_it() -> None:
+    low, tall = np.zeros((2, len(DRAWER.parameters)))
+    names = [parameter.name for parameter in DRAWER.parameters]
+    low[names.index("height")], tall[names.index("height")] = -0.15, 0.15
+    depth = float(np.linalg.norm(DRAWER.unit_cubes(*DRAWER.split(tall))[0][:3, 0]))
+    low[0] = -depth - 0.02
+    others = OtherObjects(DRAWER, "world", 10.0)
+    others.add(seen(low, DRAWER))
+    assert len(others.around(DRAWER, tall)) == len(DRAWER.bodies)
+
+
 def test_another_object_of_the_same_model_is_an_obstacle() -> None:
     beside = OPENED + [0.0, -0.65, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert len(around(seen(beside, DRAWER), seen(OPENED, DRAWER, number=1))) == 3

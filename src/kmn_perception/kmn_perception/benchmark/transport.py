@@ -63,7 +63,7 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -
             bar.update()
 
         subscriptions = CameraSubscriptions(node, ReliabilityPolicy[settings.reliability.upper()])
-        subscriptions.subscribe(PointCloud2, TOPIC, receive)
+        subscription = subscriptions.subscribe(PointCloud2, TOPIC, receive)
         publisher = multiprocessing.get_context("spawn").Process(
             target=publish, args=(settings.model, frames, sender), daemon=True
         )
@@ -77,7 +77,7 @@ def measure(node: Node, settings: MorphNodeSettings, frames: int, sender: str) -
         finally:
             publisher.kill()
             publisher.join()
-            subscriptions.end(TOPIC)
+            subscriptions.end(subscription)
     if publisher.exitcode != 0:
         raise ChildProcessError(f"the publishing process ended with {publisher.exitcode}")
     return {

@@ -19,9 +19,12 @@ PERIOD = 0.5  # seconds between two looks at who publishes
 DEPTH = 5  # messages that wait: those that are sent again come in bursts
 
 
-@dataclass
-class _Subscribed:
+@dataclass(eq=False)
+class CameraSubscription:
+    """A subscription, and how it is made anew."""
+
     kind: Any
+    topic: str
     callback: Callable[..., None]
     profile: QoSProfile
     made: Subscription
@@ -43,7 +46,7 @@ class CameraSubscriptions:
 
     def __init__(self, node: Node, reliability: ReliabilityPolicy) -> None:
         self._node, self._wanted = node, QoSProfile(depth=DEPTH, reliability=reliability)
-        self._subscribed: dict[str, _Subscribed] = {}
+        self._subscribed: list[CameraSubscription] = []  # perhaps several to one topic
         # A steady clock: a simulated time may not have begun.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(PERIOD, self._adapt, clock=steady)
@@ -52,26 +55,26 @@ class CameraSubscriptions:
         """Return how a topic is subscribed to; declare the parameters by which users choose it."""
         return overridden(self._node, Subscription, topic, self._wanted)
 
-    def subscribe(self, kind: Any, topic: str, callback: Callable[..., None]) -> None:
-        """Subscribe to a topic."""
+    def subscribe(self, kind: Any, topic: str, callback: Callable[..., None]) -> CameraSubscription:
+        """Subscribe to a topic, until `end`."""
         name, profile = self._node.resolve_topic_name(topic), self.declare(topic)
         made = self._make(kind, name, callback, self._available(name, profile))
-        self._subscribed[name] = _Subscribed(kind, callback, profile, made)
+        self._subscribed.append(CameraSubscription(kind, name, callback, profile, made))
+        return self._subscribed[-1]
 
-    def end(self, topic: str) -> None:
-        """End the subscription to a topic, if there is one."""
-        subscribed = self._subscribed.pop(self._node.resolve_topic_name(topic), None)
-        if subscribed is not None:
-            self._node.destroy_subscription(subscribed.made)
+    def end(self, subscription: CameraSubscription) -> None:
+        """End a subscription."""
+        self._subscribed.remove(subscription)
+        self._node.destroy_subscription(subscription.made)
 
     def _adapt(self) -> None:
         """Make those anew whose publishers offer something else than they did."""
-        for name, each in self._subscribed.items():
+        for each in self._subscribed:
             before = each.made.qos_profile
-            profile = self._available(name, each.profile, before.reliability)
+            profile = self._available(each.topic, each.profile, before.reliability)
             if profile.reliability != before.reliability:
                 self._node.destroy_subscription(each.made)
-                each.made = self._make(each.kind, name, each.callback, profile)
+                each.made = self._make(each.kind, each.topic, each.callback, profile)
 
     def _make(
         self, kind: Any, name: str, callback: Callable[..., None], profile: QoSProfile

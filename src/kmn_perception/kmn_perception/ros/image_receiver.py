@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from kmn_perception.ros.camera_subscriptions import CameraSubscriptions
+from kmn_perception.ros.camera_subscriptions import CameraSubscription, CameraSubscriptions
 from kmn_perception.ros.image_transport import transported
 from kmn_perception.ros.messages import MessageError
 from kmn_perception.ros.messages.compressed import raw_image
@@ -54,7 +54,7 @@ class ImageReceiver:
         self._topics = [node.resolve_topic_name("image/camera_info"), topic]
         for name in self._topics:
             subscriptions.declare(name)
-        self._listens = False
+        self._listening: list[CameraSubscription] = []
         self._changed = threading.Condition()
         self._images: deque[_Stamped] = deque(maxlen=KEPT)
         self._info: CameraInfo | None = None
@@ -63,16 +63,19 @@ class ImageReceiver:
 
     def listen(self, wanted: bool) -> None:
         """Subscribe, or no longer."""
-        if wanted and not self._listens:
-            self._subscriptions.subscribe(CameraInfo, self._topics[0], self._on_info)
-            self._subscriptions.subscribe(self._kind, self._topics[1], self._on_image)
+        if wanted and not self._listening:
+            subscribe = self._subscriptions.subscribe
+            self._listening = [
+                subscribe(CameraInfo, self._topics[0], self._on_info),
+                subscribe(self._kind, self._topics[1], self._on_image),
+            ]
         elif not wanted:
-            for topic in self._topics:
-                self._subscriptions.end(topic)
+            for subscription in self._listening:
+                self._subscriptions.end(subscription)
+            self._listening = []
             with self._changed:
                 self._images.clear()
                 self._info = None
-        self._listens = wanted
 
     def add_to(
         self, view: DepthView, settings: MorphNodeSettings, patience: float
@@ -84,7 +87,7 @@ class ImageReceiver:
         patience
             Seconds to wait for an image that is not there yet.
         """
-        if not settings.use_image or not self._listens or not view.is_organised:
+        if not settings.use_image or not self._listening or not view.is_organised:
             return view, ""
         has_info, has_images = (self._node.count_publishers(topic) > 0 for topic in self._topics)
         if not self._images and not has_images:

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.model.kinematic_model import KinematicModel
-from kmn_skill.execution.door_observation import DoorObservation, check_values
+from kmn_skill.execution.door_observation import DoorObservation, check_values, when_closed
 from kmn_skill.execution.errors import DoorError
 from kmn_skill.execution.grasp_quantities import swung
 from kmn_skill.planning.surroundings import Obstacle
 
 MAX_OBJECTS = 100  # that are kept, the newest ones
+APART = 0.2  # metres; middles of two objects of one model are further apart than those of one
+BEYOND = 0.1  # metres or radians, by which a joint may seem to be beyond its limits
 CORNERS = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3), axis=-1).reshape(-1, 3)  # of the unit cube
 SHIPPED = re.compile(r"\w+")  # name of a model; a path is nothing to be read at a message's word
 
@@ -83,8 +85,8 @@ class OtherObjects:
         """Return the bodies of the others, in the frame of an object of parameters (n + m,).
 
         One whose middle is within that object is the object itself, under whatever name; so is one
-        of its own model that overlaps with it where its joint has moved to, as perception may tell
-        an open door as a closed one that stands askew.
+        of its own model that stands where its joint can have moved it, as perception may tell an
+        open door as a closed one that stands askew.
         """
         theta, gamma = model.split(values)
         back = model.transformation.inverse(theta)
@@ -97,11 +99,8 @@ class OtherObjects:
             middle = _middle(back @ other.unit_cubes(*other.split(each.values)))
             if ((low < middle) & (middle < high)).all():
                 continue
-            if name == model.name:
-                opened = {model.actions[0].joint.name: swung(model, values, each.values)}
-                distance = middle - _middle(back @ model.moved_cubes(values, opened))
-                if np.linalg.norm(distance) < (high - low)[:2].max() / 2.0:
-                    continue
+            if name == model.name and _is_moved(model, values, each.values):
+                continue
             cubes = back @ other.moved_cubes(each.values, _positions(other, each))
             for body, cube in zip(other.bodies, cubes, strict=True):
                 size = np.linalg.norm(cube[:3, :3], axis=0)
@@ -119,6 +118,17 @@ class OtherObjects:
             except (OSError, ConfigurationError) as error:
                 raise UnknownModelError(str(error)) from error
         return self._models[name]
+
+
+def _is_moved(
+    model: KinematicModel, values: NDArray[np.float64], seen: NDArray[np.float64]
+) -> bool:
+    """Tell whether what is ``seen`` (n + m,) is that object (n + m,), moved by its joint."""
+    moved, (low, high) = swung(model, values, seen), model.actions[0].joint.limits
+    closed = when_closed(model, seen, moved)
+    here, there = (_middle(model.unit_cubes(*model.split(each))) for each in (values, closed))
+    is_near = np.linalg.norm((there - here)[:2]) < APART
+    return bool(is_near and low - BEYOND < moved < high + BEYOND)
 
 
 def _box(cubes: NDArray[np.float64]) -> NDArray[np.float64]:

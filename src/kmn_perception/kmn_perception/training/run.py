@@ -16,6 +16,7 @@ import torch
 from kmn_perception.configuration.output import replacing
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.network.weight_file import WeightsError
+from kmn_perception.training.memory import keep_freed_memory
 
 
 class RunError(ValueError):
@@ -133,6 +134,7 @@ def run_to_end(program: str, train: Callable[[], None]) -> None:
         Name that stands before an error.
     """
     torch.set_flush_denormal(True)  # tiny activations would slow a CPU down
+    keep_freed_memory()
     warnings.filterwarnings("ignore", "The value of the smallest subnormal", UserWarning)
     try:
         train()

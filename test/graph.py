@@ -14,6 +14,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from kmn_perception.ros.parameters import request_to_set
 
@@ -55,18 +56,20 @@ def spinning(node: Node) -> Iterator[None]:
     """Spin a node in a thread, and destroy it at the end."""
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
+    ended = Future()  # to shut an executor down while it spins may take its guards away
 
     def spin() -> None:
         with suppress(ExternalShutdownException):
-            executor.spin()
+            executor.spin_until_future_complete(ended)
 
     thread = threading.Thread(target=spin, name=f"{node.get_name()} executor")
     thread.start()
     try:
         yield
     finally:
-        executor.shutdown()
+        ended.set_result(None)
         thread.join()
+        executor.shutdown()
         node.destroy_node()
 
 

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import yaml
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import ConfigurationError, Section
 from kmn_perception.model.kinematic_model import KinematicModel
 from kmn_perception.model.observation import Observation
@@ -133,6 +135,13 @@ def test_settings_of_another_design_are_refused() -> None:
         load_training_settings("box_a", {"network": "paper"})
     with pytest.raises(ConfigurationError, match="'network' must be one of cascade, paper, found"):
         load_training_settings("box_a", {"network": "magic"})
+
+
+def test_settings_with_a_camera_that_is_not_there_are_refused() -> None:
+    sensor = resources.find("config/training", "robust/door").read_text(encoding="utf-8")
+    changed = {**yaml.safe_load(sensor)["sensor"], "camera": "lens"}
+    with pytest.raises(ConfigurationError, match="door.yaml: sensor: camera: 'lens' is neither"):
+        load_training_settings("robust/door", {"sensor": changed})
 
 
 @pytest.mark.parametrize(

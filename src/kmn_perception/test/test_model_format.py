@@ -145,7 +145,7 @@ def test_a_camera_lies_beside_the_model_that_names_it(
     assert KinematicModel.load("mine/model.yaml").camera.width == 320
     content["camera"] = "lens.yaml"
     (tmp_path / "mine/model.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
-    with pytest.raises(FileNotFoundError, match="'lens.yaml' is neither a file nor one of"):
+    with pytest.raises(ConfigurationError, match="model.yaml.*'lens.yaml' is neither a file nor"):
         KinematicModel.load("mine/model.yaml")
 
 

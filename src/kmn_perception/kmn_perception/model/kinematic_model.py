@@ -121,7 +121,7 @@ class KinematicModel:
             stem=model_file.read_stem(section, bodies, joints),
             actions=read_actions(section, bodies, joints, file.parent),
             mechanics=section.section("mechanics"),
-            camera=Camera.load(section.text("camera"), file.parent),
+            camera=model_file.read_camera(section, file.parent),
             input=model_file.read_input(section),
             start=section.text("start", ("prototype", "centroid"), "prototype"),
             symmetry=section.text("symmetry", ("none", "quarter_turn"), "none"),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from kmn_perception.configuration.section import Section, is_number
+from kmn_perception.model.camera import Camera
 from kmn_perception.model.parts import (
     CUBOID,
     CYLINDER,
@@ -37,6 +39,14 @@ SHAPE_KEYS = {  # likewise
     CYLINDER: (("shape", "centre", "axis", "radius", "length"), ()),
 }
 UNITS = {"translation": "m", "rotation": "rad", "scale": ""}
+
+
+def read_camera(section: Section, folder: Path) -> Camera:
+    """Read the camera of a name, or of a file from a folder."""
+    try:
+        return Camera.load(section.text("camera"), folder)
+    except FileNotFoundError as error:
+        raise section.error(f"camera: {error}") from error
 
 
 def read_theta(section: Section) -> Parameter:

@@ -13,8 +13,8 @@ from kmn_perception.ros.reports import make_status
 OK = "OK"  # the name of the status of what is as it should be
 MANY = 0.1  # share of the frames since the last report that do not come in
 REMEDY = (
-    "unless this computer is too busy to take them, start the camera's process with "
-    "FASTRTPS_DEFAULT_PROFILES_FILE set to kmn_perception's config/fastdds.xml"
+    "unless this computer is too busy to take them, let the camera publish reliably, or start its "
+    "process with FASTRTPS_DEFAULT_PROFILES_FILE set to kmn_perception's config/fastdds.xml"
 )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from kmn_perception.configuration import resources
 from kmn_perception.configuration.section import Section
 from kmn_perception.configuration.settings import read_settings
+from kmn_perception.model.camera import Camera
 from kmn_perception.network.designs import DESIGNS
 from kmn_perception.training.algorithm2 import Algorithm2
 from kmn_perception.training.settings import TrainingSettings
@@ -43,4 +44,10 @@ def load_training_settings(
     file = Section.load(resources.find("config/training", name_or_path))
     section = Section({**file.values, **(changes or {})}, file.place)
     network = section.text("network", tuple(DESIGNS))
-    return read_settings(procedure_of(network).settings_type, section)
+    settings = read_settings(procedure_of(network).settings_type, section)
+    if settings.sensor is not None:
+        try:
+            Camera.load(settings.sensor.camera)
+        except FileNotFoundError as error:
+            raise section.error(f"sensor: camera: {error}") from error
+    return settings

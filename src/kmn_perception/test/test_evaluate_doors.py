@@ -16,6 +16,7 @@ import pytest
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.evaluation.doors.errors import UNITS
+from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.doors.label import SIDES, describe_camera
 from kmn_perception.experiments.doors.experiment import WITH_COLOUR, DoorExperiment
 from kmn_perception.experiments.doors.frames import FrameFiles, find_frames
@@ -154,6 +155,29 @@ def test_delivered_depth_is_less_sure(run: Run, experiment: DoorExperiment, tmp_
         assert outcome.errors is not None
         stated.append(outcome.errors.stated[distance])
     assert stated[1] > 3.0 * stated[0]
+
+
+def test_calibrated_colour_lies_on_the_depth(rooms: Path, tmp_path: Path) -> None:
+    _copy(rooms, tmp_path, ".json", "_d.png")
+    name = tmp_path / DOORS[0]
+    shutil.copy(f"{name}_d.png", f"{name}_raw.png")
+    colour = np.zeros((480, 640, 3), np.uint8)
+    colour[200, 300] = 255
+    cv2.imwrite(f"{name}_colour.jpg", cv2.GaussianBlur(colour, (0, 0), 4.0) * 60)
+    label = json.loads(Path(f"{name}.json").read_text())
+    label["registration"] = {"depth_px_minus_undistorted_colour_px": [-2.25, 1.5]}
+    Path(f"{name}.json").write_text(json.dumps(label))
+    for depth, place in (("calibrated", (297.75, 201.5)), ("raw", (300.0, 200.0))):
+        grey = _frame(tmp_path, DOORS[0], depth).read().grey
+        assert grey is not None
+        spot = cv2.moments(grey)
+        assert (spot["m10"] / spot["m00"], spot["m01"] / spot["m00"]) == pytest.approx(
+            place, abs=0.1
+        )
+    label["registration"] = {"depth_px_minus_undistorted_colour_px": [-2.25]}
+    Path(f"{name}.json").write_text(json.dumps(label))
+    with pytest.raises(ConfigurationError, match="must be 2 numbers"):
+        _frame(tmp_path, DOORS[0])
 
 
 def test_bad_folders_are_answered_with_what_was_expected(rooms: Path, tmp_path: Path) -> None:

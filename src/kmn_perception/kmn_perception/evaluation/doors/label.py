@@ -100,12 +100,16 @@ class FrameDescription(NamedTuple):
         Of the depth image, and of the undistorted colour image.
     distortion
         (4,) or (5,) of the colour image's lens, plumb_bob; empty without.
+    registration
+        (2,) columns and rows by which the undistorted colour image is to be moved, pixels, to lie
+        on the calibrated depth.
     label
         None where no door is to be found.
     """
 
     camera: Camera
     distortion: NDArray[np.float64]
+    registration: NDArray[np.float64]
     label: DoorLabel | None
 
 
@@ -121,7 +125,7 @@ def describe_camera(name_or_path: str | Path) -> FrameDescription:
     section = Section.load(resources.find("config/cameras", name_or_path))
     key = "colour_distortion"
     distortion = np.array(section.numbers(key) if key in section else [])
-    return FrameDescription(camera, distortion, None)
+    return FrameDescription(camera, distortion, np.zeros(2), None)
 
 
 def read_description(file: Path) -> FrameDescription:
@@ -151,8 +155,13 @@ def describe(section: Section) -> FrameDescription:
     )
     lens = next((key for key in COLOUR_DISTORTION if key in intrinsics), None)
     distortion = np.array(intrinsics.numbers(lens) if lens else [])
+    registration = np.zeros(2)
+    if "registration" in section:
+        shift = section.section("registration").numbers("depth_px_minus_undistorted_colour_px", 2)
+        registration = np.array(shift)
     no_door = "door" in section and section.values["door"] is None
-    return FrameDescription(camera, distortion, None if no_door else _label(section))
+    label = None if no_door else _label(section)
+    return FrameDescription(camera, distortion, registration, label)
 
 
 def _label(section: Section) -> DoorLabel:

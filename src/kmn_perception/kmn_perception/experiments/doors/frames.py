@@ -29,6 +29,7 @@ class DoorFrame(NamedTuple):
         (height, width) metres along the optical axis, NaN where nothing was measured.
     colour
         (height, width, 3) BGR, without lens distortion, of the same pixels; None without an image.
+        With depth as delivered nothing but its lens is calibrated.
     delivered
         The depth is as the sensor delivered it.
     description
@@ -63,6 +64,11 @@ class FrameFiles(NamedTuple):
     description: FrameDescription
 
     @property
+    def delivered(self) -> bool:
+        """Whether the depth is as the sensor delivered it."""
+        return self.depth.name.endswith(DELIVERED)
+
+    @property
     def files(self) -> list[Path]:
         """All files that there are."""
         label = self.depth.with_name(f"{self.name}.json")
@@ -82,8 +88,8 @@ class FrameFiles(NamedTuple):
         except PictureError as error:
             raise FrameError(str(error)) from error
         self._check(self.depth, depth.shape)
-        delivered = self.depth.name.endswith(DELIVERED)
-        return DoorFrame(self.name, depth, self._read_colour(), delivered, self.description)
+        colour = self._read_colour()
+        return DoorFrame(self.name, depth, colour, self.delivered, self.description)
 
     def _read_colour(self) -> NDArray[np.uint8] | None:
         if self.colour is None:
@@ -92,9 +98,12 @@ class FrameFiles(NamedTuple):
         if colour is None:
             raise FrameError(f"{self.colour} is not a picture")
         self._check(self.colour, colour.shape)
-        distortion = self.description.distortion
-        if distortion.any():
-            colour = cv2.undistort(colour, self.description.camera.matrix, distortion)
+        matrix, distortion = self.description.camera.matrix, self.description.distortion
+        shifted = matrix.copy()
+        if not self.delivered:  # depth and colour are calibrated together
+            shifted[:2, 2] += self.description.registration
+        if distortion.any() or (shifted != matrix).any():
+            colour = cv2.undistort(colour, matrix, distortion, None, shifted)
         return np.asarray(colour, dtype=np.uint8)
 
     def _check(self, file: Path, shape: Sequence[int]) -> None:

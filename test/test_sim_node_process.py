@@ -7,9 +7,13 @@ import signal
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from rclpy.node import Node
+from std_srvs.srv import Trigger
 
+from kmn_perception.ros.shared_memory import MEMORY, lost_ports
 from programs import BROKEN_FILES, INTERRUPTS, assert_file_is_refused, parameters, read_until, start
 
 COMMAND = [sys.executable, "-m", "kmn_sim", "sim_node"]
@@ -67,6 +71,33 @@ def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode == 0
+
+
+def test_it_starts_anew_where_its_shared_memory_is_removed(graph: Any, domain: int) -> None:
+    """As Fast DDS may do at the start of another node, where nodes are killed."""
+    process = start(COMMAND, domain)
+    read_until("simulating model", process)
+    names = [file.read_text().strip() for file in Path(f"/proc/{process.pid}/task").glob("*/comm")]
+    ports = [int(name[8:]) for name in names if name.startswith("dds.shm.") and name[8:].isdigit()]
+    assert ports
+    assert lost_ports(str(process.pid)) == []
+    for port in ports:
+        (MEMORY / f"fastrtps_port{port}").unlink()
+    assert lost_ports(str(process.pid)) == sorted(ports)
+    try:
+        read_until("starts anew", process)
+        read_until("simulating model", process)
+        assert lost_ports(str(process.pid)) == []  # it is the same process
+        client = graph.start(lambda context: Node("client", context=context))
+        reset = client.create_client(Trigger, "reset")
+        assert reset.wait_for_service(30.0)
+        answer = reset.call_async(Trigger.Request())
+        graph.wait_for(answer.done)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        assert process.returncode == 0
+    finally:
+        process.kill()
 
 
 @pytest.mark.parametrize("text", BROKEN_FILES)

@@ -16,7 +16,6 @@ import pytest
 from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.doors.settings import DoorSettings
 from kmn_perception.evaluation.doors.errors import UNITS
-from kmn_perception.configuration.section import ConfigurationError
 from kmn_perception.evaluation.doors.label import SIDES, describe_camera
 from kmn_perception.experiments.doors.experiment import WITH_COLOUR, DoorExperiment
 from kmn_perception.experiments.doors.frames import FrameFiles, find_frames

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import select
 import signal
 import sys
 from collections.abc import Callable
@@ -20,11 +21,13 @@ from kmn_perception.configuration.node_parameters import describe_parameters
 from kmn_perception.ros.parameter_files import useless_files
 from kmn_perception.ros.parameters import foreign_parameters
 from kmn_perception.ros.program import ros_session, split_arguments
+from kmn_perception.ros.shared_memory import lost_ports
 from kmn_perception.ros.steadfast_executor import SteadfastExecutor
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 TURNS = 10  # of the executor, for what the last words of a node bring about, as an action's result
 TURN_TIMEOUT = 1.0  # seconds
+LISTENING_PERIOD = 2.0  # seconds between two looks whether messages can reach the node
 
 SomeNode = TypeVar("SomeNode", bound=Node)
 
@@ -36,6 +39,8 @@ def run_node(
     say_last_words: Callable[[SomeNode], None] = lambda node: None,
 ) -> int:
     """Run a node until it is stopped, and return the exit status; being stopped is 0.
+
+    A node that no message can reach any more, see `lost_ports`, starts anew in the same process.
 
     Parameters
     ----------
@@ -64,7 +69,10 @@ def run_node(
         for text in [*foreign_parameters(node), *useless]:
             node.get_logger().warning(text)
         stop.in_order = True
-        _serve(node, stop, say_last_words)
+        is_deaf = _serve(node, stop, say_last_words)
+    if is_deaf:
+        sys.stdout.flush()
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
     return 0
 
 
@@ -92,13 +100,19 @@ class _Stop:
         """Wish it."""
         os.write(self._alarm, b"!")
 
-    def wait(self) -> None:
-        """Wait until it is wished."""
-        os.read(self._awake, 1)
+    def wait(self, period: float) -> bool:
+        """Wait until it is wished, but not longer than a period (s); return whether it is."""
+        return bool(select.select([self._awake], [], [], period)[0])
 
 
-def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], None]) -> None:
-    """Execute callbacks in a thread until they fail or a signal comes, and destroy the node."""
+def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], None]) -> bool:
+    """Execute callbacks in a thread until they fail or a signal comes, and destroy the node.
+
+    Returns
+    -------
+    is_deaf
+        Whether it ended since no message could reach it.
+    """
     executor = SteadfastExecutor(node)
     done = Future()
 
@@ -111,7 +125,7 @@ def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], Non
     with ThreadPoolExecutor(1, thread_name_prefix="executor") as thread:
         spinning = thread.submit(spin)
         try:
-            stop.wait()
+            is_deaf = _wait(node, stop)
             say_last_words(node)
             for _ in range(0 if spinning.done() else TURNS):
                 turn = Event()
@@ -122,3 +136,19 @@ def _serve(node: SomeNode, stop: _Stop, say_last_words: Callable[[SomeNode], Non
         spinning.result()  # raises what a callback raised
     node.destroy_node()
     executor.shutdown()
+    return is_deaf
+
+
+def _wait(node: Node, stop: _Stop) -> bool:
+    """Wait for a signal, or until the node is deaf; return whether it is."""
+    before: list[int] = []
+    while not stop.wait(LISTENING_PERIOD):
+        lost = lost_ports()
+        if lost and lost == before:  # a port may be on its way to another file
+            node.get_logger().error(
+                f"another process removed the shared memory (ports {lost}) by which messages reach "
+                "this node, as can happen where nodes are killed; it starts anew"
+            )
+            return True
+        before = lost
+    return False

@@ -155,13 +155,12 @@ def describe(section: Section) -> FrameDescription:
     )
     lens = next((key for key in COLOUR_DISTORTION if key in intrinsics), None)
     distortion = np.array(intrinsics.numbers(lens) if lens else [])
-    registration = np.zeros(2)
+    shift = [0.0, 0.0]
     if "registration" in section:
         shift = section.section("registration").numbers("depth_px_minus_undistorted_colour_px", 2)
-        registration = np.array(shift)
     no_door = "door" in section and section.values["door"] is None
     label = None if no_door else _label(section)
-    return FrameDescription(camera, distortion, registration, label)
+    return FrameDescription(camera, distortion, np.array(shift), label)
 
 
 def _label(section: Section) -> DoorLabel:

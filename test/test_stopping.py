@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import pytest
@@ -36,6 +37,24 @@ class Working(Node):
         self.get_node_names()  # raises where the signal has shut the context down
 
 raise SystemExit(run_node("morph_node", "", Working))
+"""
+
+RUNNING = """
+from threading import Event, Thread
+from kmn_perception.ros.program import ros_session
+
+def deep(left):
+    return left and deep(left - 1)
+
+def run():
+    while True:
+        deep(200)
+
+with ros_session("running"):
+    for _ in range(4):
+        Thread(target=run, daemon=True).start()
+    print("running", flush=True)
+    Event().wait()
 """
 
 
@@ -108,5 +127,23 @@ def test_a_node_tells_where_its_threads_are_and_goes_on(domain: int) -> None:
         process.send_signal(signal.SIGUSR1)
         assert " in work" in read_until(" in run_node", process)
         read_until("at work", process)
+    finally:
+        process.kill()
+
+
+def test_a_program_whose_threads_run_may_be_asked_where_they_are(domain: int) -> None:
+    """What reads the frames of threads that run meanwhile crashes after some twenty times."""
+    process = start([sys.executable, "-c", RUNNING], domain)
+    try:
+        read_until("running", process)
+        with ThreadPoolExecutor(1) as reader:
+            assert process.stdout is not None
+            printed = reader.submit(process.stdout.read)
+            for _ in range(100):
+                process.send_signal(signal.SIGUSR1)
+                time.sleep(0.03)
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(TIMEOUT) == 128 + signal.SIGTERM
+            assert printed.result().count(" in deep") > 100
     finally:
         process.kill()

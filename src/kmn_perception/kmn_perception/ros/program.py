@@ -5,10 +5,11 @@ The only place that initialises rclpy.
 
 from __future__ import annotations
 
-import faulthandler
 import os
 import signal
 import sys
+import threading
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
@@ -63,7 +64,7 @@ def ros_session(name: str) -> Iterator[None]:
         Of the program, for the line that says what is wrong.
     """
     signal.signal(signal.SIGTERM, _exit)
-    faulthandler.register(signal.SIGUSR1)
+    signal.signal(signal.SIGUSR1, _tell)
     try:
         initialise(split_arguments(sys.argv[1:])[1])
         yield
@@ -76,6 +77,24 @@ def ros_session(name: str) -> Iterator[None]:
 
 def _exit(number: int, frame: FrameType | None) -> None:
     sys.exit(128 + number)
+
+
+def _tell(number: int, frame: FrameType | None) -> None:
+    """Print where each thread is, the main one last.
+
+    In Python, between two of its instructions: `faulthandler` reads the frames of threads that run
+    meanwhile, which ended a node by a segmentation fault.
+    """
+    signal.signal(number, signal.SIG_IGN)  # until it is told
+    main = threading.main_thread().ident
+    names = {thread.ident: thread.name for thread in threading.enumerate()}
+    frames = sys._current_frames()
+    lines = []
+    for ident in sorted(frames, key=lambda ident: ident == main):
+        lines += [f"Thread {names.get(ident, ident)} (most recent call last):\n"]
+        lines += traceback.format_stack(frames[ident])
+    os.write(sys.stderr.fileno(), "".join(lines).encode(errors="replace"))
+    signal.signal(number, _tell)
 
 
 def initialise(arguments: list[str]) -> None:

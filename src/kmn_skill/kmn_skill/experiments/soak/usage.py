@@ -14,7 +14,10 @@ MIB = 2.0**20
 
 
 class Usage(NamedTuple):
-    """What a process takes: hours since the start, MiB in memory, open files, and threads."""
+    """What a process takes: hours since the start, MiB of memory, open files, and threads.
+
+    What it shares is not counted, as libraries, and the shared memory of those it hears.
+    """
 
     hours: float
     memory: float
@@ -26,11 +29,11 @@ def usage_of(pid: int, hours: float) -> Usage | None:
     """Return what a process takes now; None if there is none."""
     process = Path(f"/proc/{pid}")
     try:
-        pages = int((process / "statm").read_text().split()[1])
+        _, resident, shared, *_ = map(int, (process / "statm").read_text().split())
         files, threads = len(os.listdir(process / "fd")), len(os.listdir(process / "task"))
     except OSError:
         return None
-    return Usage(hours, pages * resource.getpagesize() / MIB, files, threads)
+    return Usage(hours, (resident - shared) * resource.getpagesize() / MIB, files, threads)
 
 
 class UsageLog:

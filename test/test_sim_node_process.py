@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import time
@@ -76,15 +77,16 @@ def test_where_egl_does_not_start_it_says_so_and_goes_on(domain: int) -> None:
 def test_it_starts_anew_where_its_shared_memory_is_removed(graph: Any, domain: int) -> None:
     """As Fast DDS may do at the start of another node, where nodes are killed."""
     process = start(COMMAND, domain)
-    read_until("simulating model", process)
-    names = [file.read_text().strip() for file in Path(f"/proc/{process.pid}/task").glob("*/comm")]
-    ports = [int(name[8:]) for name in names if name.startswith("dds.shm.") and name[8:].isdigit()]
-    assert ports
-    assert lost_ports(str(process.pid)) == []
-    for port in ports:
-        (MEMORY / f"fastrtps_port{port}").unlink()
-    assert lost_ports(str(process.pid)) == sorted(ports)
     try:
+        read_until("simulating model", process)
+        tasks = Path(f"/proc/{process.pid}/task").glob("*/comm")
+        names = [file.read_text().strip() for file in tasks]
+        ports = [int(name[8:]) for name in names if re.fullmatch(r"dds\.shm\.\d+", name)]
+        assert ports
+        assert lost_ports(str(process.pid)) == []
+        for port in ports:
+            (MEMORY / f"fastrtps_port{port}").unlink()
+        assert lost_ports(str(process.pid)) == sorted(ports)
         read_until("starts anew", process)
         read_until("simulating model", process)
         assert lost_ports(str(process.pid)) == []  # it is the same process

@@ -14,7 +14,7 @@ import pytest
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from kmn_perception.ros.shared_memory import MEMORY, lost_ports
+from kmn_perception.ros.shared_memory import lost_ports
 from programs import BROKEN_FILES, INTERRUPTS, assert_file_is_refused, parameters, read_until, start
 
 COMMAND = [sys.executable, "-m", "kmn_sim", "sim_node"]
@@ -85,7 +85,7 @@ def test_it_starts_anew_where_its_shared_memory_is_removed(graph: Any, domain: i
         assert ports
         assert lost_ports(str(process.pid)) == []
         for port in ports:
-            (MEMORY / f"fastrtps_port{port}").unlink()
+            Path(f"/dev/shm/fastrtps_port{port}").unlink()
         assert lost_ports(str(process.pid)) == sorted(ports)
         read_until("starts anew", process)
         read_until("simulating model", process)

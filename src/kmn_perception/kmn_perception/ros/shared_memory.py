@@ -11,13 +11,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-MEMORY = Path("/dev/shm")
 _LISTENER = re.compile(r"dds\.shm\.(\d+)")  # name of the thread that reads a port
-_FILE = "fastrtps_port{}"
+_PORT = re.compile(r"/dev/shm/\w+_port(\d+)( \(deleted\))?$", re.MULTILINE)  # of the memory map
 
 
 def lost_ports(process: str = "self") -> list[int]:
-    """Return the ports at which a process listens, but whose files are not those it reads.
+    """Return the ports at which a process listens, but whose files were removed.
 
     Empty where there is no such transport, or nothing that tells (``/proc`` of Linux).
 
@@ -27,18 +26,12 @@ def lost_ports(process: str = "self") -> list[int]:
         Its number; ``self`` is the one that asks.
     """
     folder = Path("/proc", process)
-    names = [_read(task / "comm") for task in folder.glob("task/*")]
-    ports = [int(found[1]) for name in names if (found := _LISTENER.fullmatch(name.strip()))]
-    mapped = {line.split()[4] for line in _read(folder / "maps").splitlines() if "_port" in line}
-    return sorted(port for port in ports if _number(MEMORY / _FILE.format(port)) not in mapped)
-
-
-def _number(file: Path) -> str:
-    """Return the number of a file's content, by which maps name it; empty if there is no file."""
-    try:
-        return str(file.stat().st_ino)
-    except OSError:
-        return ""
+    names = [_read(task / "comm").strip() for task in folder.glob("task/*")]
+    ports = {found[1] for name in names if (found := _LISTENER.fullmatch(name))}
+    mapped = _PORT.findall(_read(folder / "maps"))
+    there = {port for port, gone in mapped if not gone}
+    removed = {port for port, gone in mapped if gone}
+    return sorted(int(port) for port in ports & removed - there)
 
 
 def _read(file: Path) -> str:
